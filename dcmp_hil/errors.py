@@ -1,0 +1,83 @@
+"""The tree of errors: every message names its remedy, every branch has its exit code."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.values import Cycle
+
+
+class DcmpError(Exception):
+    """Base of everything this package raises on purpose."""
+
+    exit_code: ClassVar[int] = 1
+
+
+class ConfigError(DcmpError):
+    """The rig, an option or an input file is wrong; lists every fault found, not only the first.
+
+    Parameters
+    ----------
+    faults
+        One sentence or short paragraph per fault: place, what was got, what was expected, remedy.
+    """
+
+    exit_code = 2
+
+    def __init__(self, *faults: str) -> None:
+        super().__init__("\n".join(faults))
+        self.faults = faults
+
+
+class BackendError(DcmpError):
+    """The device or the way to it failed."""
+
+    exit_code = 3
+
+
+class OpenError(BackendError):
+    """The backend could not be opened."""
+
+
+class LinkError(BackendError):
+    """The link broke while it was in use."""
+
+
+class SampleTimeoutError(BackendError):
+    """No sample arrived in time."""
+
+
+class ProtocolError(BackendError):
+    """What arrived contradicts the protocol, such as time that stands still."""
+
+
+class TripError(DcmpError):
+    """The supervisor, or the device, stopped the run; the amplifier is at 0 V.
+
+    Parameters
+    ----------
+    reason
+        A short word that stays the same from release to release, such as ``disturbance``.
+    sentence
+        What was seen, with figures and units.
+    remedy
+        What to look at first.
+    """
+
+    exit_code = 4
+
+    def __init__(self, reason: str, sentence: str, remedy: str) -> None:
+        super().__init__(f"{sentence} {remedy}")
+        self.reason = reason
+        self.sentence = sentence
+        self.remedy = remedy
+        self.cycles: Sequence[Cycle] = ()  # the last second, filled in by the loop
+
+
+class DeadlineError(DcmpError):
+    """A deadline was missed under strict timing."""
+
+    exit_code = 5

@@ -1,0 +1,36 @@
+"""The pendulum as numbers: what observer and controller believe of it, and what the simulation is."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Model(NamedTuple):
+    """Parameters of eqs. (1)-(4), all over the inertia J.
+
+    Parameters
+    ----------
+    f0
+        1/s, viscous friction fd/J.
+    f1
+        rad/s2, Coulomb friction fc/J.
+    gravity
+        rad/s2, gmL/J.
+    ku
+        (rad/s2)/V, ku/J.
+    eta, eta_amplitude, eta_rate
+        rad/s2, rad/s2, rad/s: the external disturbance eta/J = eta + eta_amplitude sin(eta_rate t), eq. (13).
+    """
+
+    f0: float = 0.1
+    f1: float = 1.3
+    gravity: float = 14.03
+    ku: float = 5.4
+    eta: float = 0.84
+    eta_amplitude: float = 0.2
+    eta_rate: float = 0.2
+
+    def external(self, t: float) -> float:
+        """Return eta/J at time `t`, rad/s2."""
+        return self.eta + self.eta_amplitude * math.sin(self.eta_rate * t)

@@ -1,0 +1,75 @@
+"""The one vocabulary: what travels between the stages of a period, a unit on every line."""
+
+import math
+from enum import IntEnum
+from typing import Literal, NamedTuple
+
+
+class Fault(IntEnum):
+    """Fault code reported by the device; 0 is healthy, every other value stops the run."""
+
+    NONE = 0
+    UNKNOWN = 255  # a code that this version does not know: treated like any other fault
+
+
+class Sample(NamedTuple):
+    """What the device measured at one instant."""
+
+    t: float  # s, device time since opening, unwrapped: lost samples show as a larger step
+    position: float  # rad, unwrapped; 0 = hanging at rest
+    voltage: float  # V, really applied over the period that ended at t
+    fault: int = Fault.NONE  # a Fault; a plain int is accepted so that an unknown code survives
+
+
+class Estimate(NamedTuple):
+    """What the observer believes at the instant of the sample."""
+
+    position: float  # rad
+    velocity: float  # rad/s
+    disturbance: float  # rad/s2, the w of eq. (2)
+
+
+class Truth(NamedTuple):
+    """What the simulated plant knows and no loop may see; NaN on a real rig."""
+
+    position: float  # rad
+    velocity: float  # rad/s
+    disturbance: float  # rad/s2, by the model's f0 and ku/J
+
+
+class Reference(NamedTuple):
+    """Where the arm should be at one instant."""
+
+    position: float  # rad
+    velocity: float  # rad/s
+    acceleration: float  # rad/s2
+
+
+class Timing(NamedTuple):
+    """When one period really ran, by the host's monotonic clock."""
+
+    period: float  # s, from the previous sample's arrival to this one's
+    lateness: float  # s, arrival after the instant that the first sample and device time promise
+    compute: float  # s, from the sample's arrival to the command's departure
+
+
+class Cycle(NamedTuple):
+    """One period, whole: all that telemetry and the black box ever see."""
+
+    sample: Sample
+    estimate: Estimate
+    reference: Reference  # at sample.t + delay, when this period's command takes effect
+    demand: float  # V, what the controller asked for
+    voltage: float  # V, what the supervisor let through
+    timing: Timing
+
+
+class Event(NamedTuple):
+    """Something worth a line of text."""
+
+    t: float  # s, device time
+    level: Literal["INFO", "WARN", "ERROR", "PHASE"]  # PHASE: the text is the name of a new phase
+    text: str
+
+
+UNKNOWN_TRUTH = Truth(math.nan, math.nan, math.nan)
