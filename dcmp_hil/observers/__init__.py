@@ -1,0 +1,35 @@
+"""Observers: from sampled positions to position, velocity and disturbance; one file each."""
+
+from typing import NamedTuple, Protocol
+
+from dcmp_hil.model import Model
+from dcmp_hil.values import Estimate, Sample
+
+
+class Observer(Protocol):
+    """What the loop asks of an observer."""
+
+    def update(self, sample: Sample) -> Estimate:
+        """Take the next sample and return the estimate at `sample.t`."""
+        ...
+
+
+class Setting(NamedTuple):
+    """What an observer may know of the rig it serves.
+
+    Parameters
+    ----------
+    model
+        The believed plant.
+    period
+        s, nominal.
+    counts_per_rev
+        Encoder counts a revolution; None for an ideal encoder.
+    """
+
+    model: Model
+    period: float
+    counts_per_rev: float | None
+
+
+__all__ = ["Observer", "Setting"]

@@ -1,0 +1,112 @@
+"""The paper's observer as the paper runs it: eqs. (6)-(8) by explicit Euler, outputs corrected."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from dcmp_hil.errors import ProtocolError
+from dcmp_hil.observers import Setting
+from dcmp_hil.section import Positive, Section
+from dcmp_hil.values import Estimate, Sample
+
+_LAMBDA1, _LAMBDA2, _LAMBDA3 = 2.0, 1.5, 1.1
+
+
+class PaperSettings(Section):
+    """`[observer]` with `kind = "paper"`."""
+
+    kind: Literal["paper"] = "paper"
+    L1_1_s: Positive = 4.9
+    """Copy gain L1 of eq. (14), 1/s."""
+    L2_1_s2: Positive = 5.51
+    """Copy gain L2 of eq. (14), 1/s2."""
+    M_rad_s3: Positive = 1000.0
+    """Differentiator gain M of eq. (14), rad/s3."""
+    start: Literal["measured", "zero"] = "measured"
+    """Where z1 begins: at the first measured position, or at 0 as in the paper."""
+
+    def build(self, setting: Setting) -> PaperObserver:
+        """Make the observer for a rig."""
+        return PaperObserver(
+            setting, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, from_zero=self.start == "zero"
+        )
+
+
+class PaperObserver:
+    """Super-twisting observer by explicit Euler steps, for the reproduction of the paper.
+
+    Eq. (8) is read with the auxiliary that the paper's misprint hides (it prints v1' twice):
+
+        n1 = -l1 M^(1/3) |v1 - e|^(2/3) sgn(v1 - e) + v2,   v1' = n1,
+        n2 = -l2 M^(1/2) |v2 - n1|^(1/2) sgn(v2 - n1) + v3, v2' = n2,
+        v3' = -l3 M sgn(v3 - n2).
+
+    Parameters
+    ----------
+    setting
+        The rig served.
+    L1, L2, M
+        Gains of eq. (14): 1/s, 1/s2, rad/s3.
+    from_zero
+        Begin at z = 0 like the paper instead of at the first measured position.
+    """
+
+    def __init__(
+        self,
+        setting: Setting,
+        *,
+        L1: float = 4.9,
+        L2: float = 5.51,
+        M: float = 1000.0,
+        from_zero: bool = False,
+    ) -> None:
+        self.f0, self._ku = setting.model.f0, setting.model.ku
+        self.L1, self.L2 = L1, L2
+        self._n1_gain = _LAMBDA1 * M ** (1 / 3)
+        self._n2_gain = _LAMBDA2 * math.sqrt(M)
+        self._n3_gain = _LAMBDA3 * M
+        self._from_zero = from_zero
+        self._restart_after = 10.02 * setting.period
+        self._t = self._y = math.nan
+        self._z1 = self._z2 = 0.0
+        self.v1 = self.v2 = self.v3 = 0.0
+
+    def update(self, sample: Sample) -> Estimate:
+        """Step from the stored position to `sample.t`, then store the new one.
+
+        Raises
+        ------
+        ProtocolError
+            If device time does not advance.
+        """
+        t, y, voltage, _ = sample
+        dt = t - self._t
+        if dt <= 0.0:
+            raise ProtocolError(
+                f"The sample at t = {t:.6f} s does not come after the one at {self._t:.6f} s. "
+                "Check the device's clock, or the time column of the recording."
+            )
+        if dt <= self._restart_after:
+            self._euler_step(dt, self._ku * voltage)
+        else:  # the first sample (dt is NaN), or one after a gap too long to bridge
+            first = math.isnan(dt)
+            self._z1, self._z2 = (0.0 if first and self._from_zero else y), 0.0
+            self.v1 = self.v2 = self.v3 = 0.0
+        self._t, self._y = t, y
+        return Estimate(self._z1 + self.v1, self._z2 + self.v2 + self.L1 * self.v1, self.disturbance())
+
+    def disturbance(self) -> float:
+        """Return w_hat by the corrected eq. (9), rad/s2."""
+        return self.v3 + (self.L1 + self.f0) * self.v2 + (self.L2 + self.f0 * self.L1) * self.v1
+
+    def _euler_step(self, dt: float, u: float) -> None:
+        e = self._y - self._z1
+        v1, v2, v3 = self.v1, self.v2, self.v3
+        n1 = v2 - self._n1_gain * math.copysign(abs(v1 - e) ** (2 / 3), v1 - e)
+        n2 = v3 - self._n2_gain * math.copysign(math.sqrt(abs(v2 - n1)), v2 - n1)
+        n3 = -math.copysign(self._n3_gain, v3 - n2) if v3 != n2 else 0.0
+        self.v1, self.v2, self.v3 = v1 + dt * n1, v2 + dt * n2, v3 + dt * n3
+        z1, z2 = self._z1, self._z2
+        self._z1 = z1 + dt * (z2 + self.L1 * e)
+        self._z2 = z2 + dt * (u - self.f0 * z2 + self.L2 * e)
