@@ -1,0 +1,32 @@
+"""Controllers: from reference and estimate to a voltage; one file each."""
+
+from typing import NamedTuple, Protocol
+
+from dcmp_hil.model import Model
+from dcmp_hil.values import Estimate, Reference
+
+
+class Controller(Protocol):
+    """What the loop asks of a controller."""
+
+    def update(self, reference: Reference, estimate: Estimate) -> float:
+        """Return the voltage to ask for, V; both arguments hold for the instant at which it takes effect."""
+        ...
+
+
+class Setting(NamedTuple):
+    """What a controller may know of the rig it serves.
+
+    Parameters
+    ----------
+    model
+        The believed plant.
+    period
+        s, nominal.
+    """
+
+    model: Model
+    period: float
+
+
+__all__ = ["Controller", "Setting"]

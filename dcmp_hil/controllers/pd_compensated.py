@@ -1,0 +1,59 @@
+"""PD tracking, with (eq. 10) or without (the baseline) compensation of the estimated disturbance."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from dcmp_hil.controllers import Setting
+from dcmp_hil.section import NotNegative, Section
+from dcmp_hil.values import Estimate, Reference
+
+
+class PdSettings(Section):
+    """`[controller]` with `kind = "pd_compensated"` (eq. 10) or `"pd"` (the same without w_hat)."""
+
+    kind: Literal["pd_compensated", "pd"] = "pd_compensated"
+    kp_1_s2: NotNegative = 4000.0
+    """Proportional gain of eq. (14), 1/s2."""
+    kd_1_s: NotNegative = 130.0
+    """Derivative gain of eq. (14), 1/s."""
+    position: Literal["estimated", "measured"] = "estimated"
+    """Which position the proportional term takes: x1_hat (quiet) or the encoder's (as in the paper)."""
+    friction_feedforward: bool = False
+    """Tell the observer of Coulomb friction, f1 of [model], by the sign of the reference's velocity."""
+
+    def build(self, setting: Setting) -> PdCompensated:
+        """Make the controller for a rig."""
+        return PdCompensated(
+            setting, kp=self.kp_1_s2, kd=self.kd_1_s, compensate=self.kind == "pd_compensated"
+        )
+
+
+class PdCompensated:
+    """Corrected eq. (10): u = -w_hat - kp (x1 - x_r) - kd (x2 - x_r') + f0 x2 + x_r'', V = u / (ku/J).
+
+    The paper prints a factor 1/ku in front as well, which divides once too often: eq. (4) has u = (ku/J) V.
+
+    Parameters
+    ----------
+    setting
+        The rig served.
+    kp, kd
+        1/s2 and 1/s; the closed loop's error obeys s^2 + kd s + kp.
+    compensate
+        False leaves w_hat out: the baseline that shows what the observer is worth.
+    """
+
+    def __init__(
+        self, setting: Setting, *, kp: float = 4000.0, kd: float = 130.0, compensate: bool = True
+    ) -> None:
+        self._kp, self._kd = kp, kd
+        self._f0, self._volts = setting.model.f0, 1.0 / setting.model.ku
+        self._compensation = 1.0 if compensate else 0.0
+
+    def update(self, reference: Reference, estimate: Estimate) -> float:
+        """Return the voltage to ask for, V."""
+        xr, vr, ar = reference
+        x1, x2, w = estimate
+        u = ar - self._compensation * w - self._kp * (x1 - xr) - self._kd * (x2 - vr) + self._f0 * x2
+        return u * self._volts

@@ -1,0 +1,75 @@
+"""The state ahead: the estimate carried over the voltages sent and not yet applied."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING
+
+from dcmp_hil.values import Estimate
+
+if TYPE_CHECKING:
+    from dcmp_hil.model import Model
+    from dcmp_hil.values import Sample
+
+
+class Predictor:
+    """Exact prediction of x'' = -f0 x' + w + (ku/J) V with w and V held over each period.
+
+    Parameters
+    ----------
+    model
+        What the host believes of the plant.
+    period
+        s.
+    delay_samples
+        Periods between a sample and the instant at which its command takes effect.
+    measured
+        Start from the encoder's position, as eq. (10) prints it, instead of x1_hat, which is quieter.
+    """
+
+    def __init__(self, model: Model, period: float, delay_samples: int, *, measured: bool = False) -> None:
+        self._a, self._p1, self._p2 = held_input(model.f0, period)
+        self._ku = model.ku
+        self._measured = measured
+        self._under_way = deque([0.0] * delay_samples, maxlen=delay_samples)  # V, oldest first
+
+    def ahead(self, sample: Sample, estimate: Estimate) -> Estimate:
+        """Return the state at the instant at which the next command takes effect."""
+        x1, x2, w = estimate
+        if self._measured:
+            x1 = sample.position
+        for voltage in self._under_way:
+            drive = w + self._ku * voltage
+            x1 += self._p1 * x2 + self._p2 * drive
+            x2 = self._a * x2 + self._p1 * drive
+        return Estimate(x1, x2, w)
+
+    def sent(self, voltage: float) -> None:
+        """Remember what was just sent, V."""
+        self._under_way.append(voltage)
+
+
+def held_input(f0: float, period: float) -> tuple[float, float, float]:
+    """Discretise x'' = -f0 x' + d exactly for d held over `period`.
+
+    Parameters
+    ----------
+    f0
+        1/s, viscous friction over inertia; 0 is allowed.
+    period
+        s.
+
+    Returns
+    -------
+    tuple
+        (a, p1, p2): x1 += p1 x2 + p2 d; x2 = a x2 + p1 d.
+    """
+    a = math.exp(-f0 * period)
+    if f0 * period < 1e-9:
+        return a, period, 0.5 * period * period
+    p1 = -math.expm1(-f0 * period) / f0
+    # For small f0 T the closed form (T - p1)/f0 cancels; the series is exact to double precision.
+    x = f0 * period
+    p2 = period * period * (0.5 - x / 6 + x * x / 24 - x**3 / 120) if x < 1e-2 else (period - p1) / f0
+    return a, p1, p2

@@ -1,0 +1,26 @@
+"""References: position, velocity and acceleration as functions of the trajectory's own time."""
+
+from typing import Annotated, Protocol
+
+from pydantic import Field
+
+from dcmp_hil.section import Section
+from dcmp_hil.values import Reference
+
+
+class ReferenceSource(Protocol):
+    """What the trajectory asks of a reference."""
+
+    def at(self, t: float) -> Reference:
+        """Return where the arm should be `t` seconds after the start."""
+        ...
+
+
+class ReferenceSettings(Section):
+    """What every `[reference]` has, whatever its kind."""
+
+    soft_start_s: Annotated[float, Field(ge=0, le=60)] = 2.0
+    """Over this time the reference fades in from where the arm is, s; 0 = at once."""
+
+
+__all__ = ["ReferenceSettings", "ReferenceSource"]

@@ -1,0 +1,58 @@
+"""References that swing: a sine and a chirp."""
+
+import math
+from typing import Literal
+
+from dcmp_hil.references import ReferenceSettings
+from dcmp_hil.section import NotNegative, Positive
+from dcmp_hil.values import Reference
+
+
+class Sine(ReferenceSettings):
+    """x_r = offset + amplitude sin(rate t + phase); the defaults are the paper's sin(t/2)."""
+
+    kind: Literal["sine"] = "sine"
+    amplitude_rad: NotNegative = 1.0
+    """Amplitude, rad."""
+    rate_rad_s: Positive = 0.5
+    """Angular frequency, rad/s."""
+    phase_rad: float = 0.0
+    """Phase at the start, rad."""
+    offset_rad: float = 0.0
+    """Middle of the swing, rad; 0 = hanging."""
+
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+        rate, angle = self.rate_rad_s, self.rate_rad_s * t + self.phase_rad
+        swing = self.amplitude_rad * math.sin(angle)
+        return Reference(
+            self.offset_rad + swing, self.amplitude_rad * rate * math.cos(angle), -rate * rate * swing
+        )
+
+
+class Chirp(ReferenceSettings):
+    """A sine whose frequency rises linearly over `sweep_s` and then stays."""
+
+    kind: Literal["chirp"]
+    amplitude_rad: NotNegative = 0.5
+    """Amplitude, rad."""
+    from_hz: NotNegative = 0.1
+    """Frequency at the start, Hz."""
+    to_hz: Positive = 1.0
+    """Frequency at the end of the sweep, Hz."""
+    sweep_s: Positive = 20.0
+    """Length of the sweep, s."""
+    offset_rad: float = 0.0
+    """Middle of the swing, rad; 0 = hanging."""
+
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+        slope = (self.to_hz - self.from_hz) / self.sweep_s if t < self.sweep_s else 0.0
+        swept = min(t, self.sweep_s)
+        turns = swept * (self.from_hz + 0.5 * (self.to_hz - self.from_hz) * swept / self.sweep_s)
+        angle = 2 * math.pi * (turns + self.to_hz * (t - swept))
+        rate = 2 * math.pi * (self.from_hz + slope * t if t < self.sweep_s else self.to_hz)
+        sine, cosine = self.amplitude_rad * math.sin(angle), self.amplitude_rad * math.cos(angle)
+        return Reference(
+            self.offset_rad + sine, rate * cosine, 2 * math.pi * slope * cosine - rate * rate * sine
+        )

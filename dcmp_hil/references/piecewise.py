@@ -1,0 +1,94 @@
+"""References made of pieces: hold, step, trapezoid."""
+
+import math
+from typing import Literal
+
+from dcmp_hil.references import ReferenceSettings
+from dcmp_hil.section import NotNegative, Positive
+from dcmp_hil.values import Reference
+
+
+class Hold(ReferenceSettings):
+    """One position, held."""
+
+    kind: Literal["hold"]
+    position_rad: float = 0.0
+    """Position, rad; 0 = hanging."""
+
+    def at(self, t: float) -> Reference:  # noqa: ARG002 - the same at every instant
+        """Return the reference `t` seconds after the start."""
+        return Reference(self.position_rad, 0.0, 0.0)
+
+
+class Step(ReferenceSettings):
+    """From one position to another in no time; the derivatives stay 0."""
+
+    kind: Literal["step"]
+    before_rad: float = 0.0
+    """Position before the step, rad."""
+    after_rad: float = 0.5
+    """Position from the step on, rad."""
+    at_s: NotNegative = 5.0
+    """When the step happens, s after the start."""
+
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+        return Reference(self.after_rad if t >= self.at_s else self.before_rad, 0.0, 0.0)
+
+
+class Trapezoid(ReferenceSettings):
+    """To and fro between two positions, the velocity a trapezoid, with a rest at either end."""
+
+    kind: Literal["trapezoid"]
+    low_rad: float = 0.0
+    """Where it starts, rad."""
+    high_rad: float = 1.0
+    """Where it turns, rad."""
+    velocity_rad_s: Positive = 1.0
+    """Velocity in the middle of a move, rad/s."""
+    acceleration_rad_s2: Positive = 4.0
+    """Acceleration at both ends of a move, rad/s2."""
+    rest_s: NotNegative = 1.0
+    """Rest at either end, s."""
+
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+        distance = self.high_rad - self.low_rad
+        # A move too short for the full velocity is a triangle.
+        ramp = min(self.velocity_rad_s / self.acceleration_rad_s2, math.sqrt(abs(distance) / self.acceleration_rad_s2))
+        if ramp == 0.0:
+            return Reference(self.low_rad, 0.0, 0.0)
+        move = ramp + abs(distance) / (self.acceleration_rad_s2 * ramp)
+        there, into = divmod(max(t, 0.0), move + self.rest_s)
+        start, way = (self.low_rad, distance) if there % 2 == 0 else (self.high_rad, -distance)
+        x, v, a = trapezoid(min(into / move, 1.0), ramp / move)
+        return Reference(start + way * x, way * v / move, way * a / move**2)
+
+
+def trapezoid(s: float, ramp: float) -> tuple[float, float, float]:
+    """Move from 0 to 1 while `s` goes from 0 to 1, the velocity a trapezoid.
+
+    Parameters
+    ----------
+    s
+        Part of the time gone; below 0 and above 1 the move rests.
+    ramp
+        Part of the time spent accelerating, and again decelerating; above 0, at most 0.5.
+
+    Returns
+    -------
+    tuple
+        Position and its first two derivatives by `s`.
+    """
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    if s >= 1.0:
+        return 1.0, 0.0, 0.0
+    top = 1.0 / (1.0 - ramp)
+    steep = top / ramp
+    if s < ramp:
+        return 0.5 * steep * s * s, steep * s, steep
+    if s > 1.0 - ramp:
+        left = 1.0 - s
+        return 1.0 - 0.5 * steep * left * left, steep * left, -steep
+    return top * (s - 0.5 * ramp), top, 0.0

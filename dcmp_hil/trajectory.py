@@ -1,0 +1,76 @@
+"""The trajectory of one run: hold, soft start into the reference, and the way down at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dcmp_hil.references.piecewise import trapezoid
+from dcmp_hil.values import Reference
+
+if TYPE_CHECKING:
+    from dcmp_hil.references import ReferenceSource
+
+LOWERING = 2.0  # s, from wherever the arm is to hanging
+
+
+class Trajectory:
+    """A reference with a beginning and an end.
+
+    Parameters
+    ----------
+    source
+        The reference, a function of the time since `begin`.
+    soft_start
+        s, over which the reference fades in from the arm's own position; 0 = at once.
+    """
+
+    def __init__(self, source: ReferenceSource, soft_start: float) -> None:
+        self._source = source
+        self._soft_start = soft_start
+        self._t0 = 0.0
+        self._x0 = 0.0
+        self._begun = False
+        self._way_down: _WayDown | None = None
+
+    def begin(self, t: float, position: float) -> None:
+        """Start the trajectory's clock at device time `t`, from `position` (rad)."""
+        self._t0, self._x0, self._begun = t, position, True
+
+    def lower(self, t: float) -> None:
+        """From `t` on, go down to hanging in `LOWERING` seconds; at most one turn is undone."""
+        self._way_down = _WayDown(t, self.at(t).position)
+
+    def at(self, t: float) -> Reference:
+        """Return the reference at device time `t`."""
+        if self._way_down is not None and t >= self._way_down.t0:
+            return self._way_down.at(t)
+        if not self._begun:
+            return Reference(self._x0, 0.0, 0.0)
+        since = t - self._t0
+        reference = self._source.at(since)
+        if since < self._soft_start:
+            return _faded_in(reference, self._x0, since / self._soft_start, self._soft_start)
+        return reference
+
+
+def _faded_in(reference: Reference, x0: float, s: float, length: float) -> Reference:
+    """x0 b + (1 - b) x_r with b = 1 - (10 s^3 - 15 s^4 + 6 s^5), and its exact derivatives."""
+    s = max(s, 0.0)
+    gone = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    gone1 = 30.0 * s * s * (1.0 - s) ** 2 / length
+    gone2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length)
+    x, v, a = reference
+    return Reference(
+        x0 + gone * (x - x0), gone * v + gone1 * (x - x0), gone * a + 2.0 * gone1 * v + gone2 * (x - x0)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _WayDown:
+    t0: float
+    x0: float
+
+    def at(self, t: float) -> Reference:
+        x, v, a = trapezoid((t - self.t0) / LOWERING, 1.0 / 3.0)
+        return Reference(self.x0 * (1.0 - x), -self.x0 * v / LOWERING, -self.x0 * a / LOWERING**2)
