@@ -1,0 +1,120 @@
+"""Monitors: what may not happen while the amplifier is live, written so that NaN fails closed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from dcmp_hil.errors import TripError
+from dcmp_hil.values import Fault
+
+if TYPE_CHECKING:
+    from dcmp_hil.observers import Observer
+    from dcmp_hil.values import Estimate, Sample
+
+
+class Monitor(Protocol):
+    """One thing watched, every period."""
+
+    def check(self, sample: Sample, estimate: Estimate) -> None:
+        """Raise TripError if the run must stop."""
+        ...
+
+
+class Finite:
+    """Every number of sample and estimate is finite, and the device is healthy: needed on every rig."""
+
+    def check(self, sample: Sample, estimate: Estimate) -> None:
+        """Raise TripError on NaN, infinity or a device fault."""
+        if sample.fault != Fault.NONE:
+            raise TripError(
+                "device_fault",
+                f"The device reports fault {sample.fault} at t = {sample.t:.3f} s.",
+                "Look the code up in the list of faults, mend the cause, then arm again.",
+            )
+        t, position, voltage, _ = sample
+        x1, x2, w = estimate
+        if not math.isfinite(t + position + voltage + x1 + x2 + w):
+            raise TripError(
+                "not_finite",
+                f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
+                f"estimate ({x1}, {x2}, {w}).",
+                "Look for a gain that makes the observer diverge, and at the encoder.",
+            )
+
+
+class Ranges:
+    """Position and velocity stay inside their limits.
+
+    Parameters
+    ----------
+    position
+        rad, either way from hanging.
+    velocity
+        rad/s, either way.
+    """
+
+    def __init__(self, position: float, velocity: float) -> None:
+        self._position = position
+        self._velocity = velocity
+
+    def check(self, sample: Sample, estimate: Estimate) -> None:
+        """Raise TripError outside the limits."""
+        if not -self._velocity <= estimate.velocity <= self._velocity:
+            raise TripError(
+                "speed",
+                f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s; "
+                f"the limit is {self._velocity:g} rad/s.",
+                "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
+            )
+        if not -self._position <= sample.position <= self._position:
+            raise TripError(
+                "travel",
+                f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; the limit is {self._position:g} rad.",
+                "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
+            )
+
+
+class DisturbanceWatch:
+    """A second, faster observer: what it cannot explain by voltage and inertia must stay plausible.
+
+    Diverging observers, reversed polarity, a stuck encoder and lost motor power all show as an absurd w_hat:
+    first-order filtered over 10 ms it reaches 20 rad/s2 in the worst healthy run, 45 with 1.5 times the
+    motor gain and no soft start.
+
+    Parameters
+    ----------
+    observer
+        The second observer (mu0 = 100 rad/s by default).
+    period
+        s.
+    limit
+        rad/s2.
+    for_
+        s, how long the filtered |w_hat| must stay above the limit.
+    """
+
+    def __init__(self, observer: Observer, period: float, limit: float, for_: float = 5e-3) -> None:
+        self._observer = observer
+        self._keep = math.exp(-period / 10e-3)
+        self._limit = limit
+        self._allowed = max(1, round(for_ / period))
+        self._filtered = 0.0
+        self._above = 0
+
+    def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - it has an estimate of its own
+        """Raise TripError once the filtered disturbance has been above the limit for too long."""
+        w = self._observer.update(sample).disturbance
+        self._filtered = filtered = w + self._keep * (self._filtered - w)
+        if -self._limit <= filtered <= self._limit:
+            self._above = 0
+            return
+        self._above += 1
+        if self._above >= self._allowed or filtered != filtered:
+            raise TripError(
+                "disturbance",
+                f"Estimated disturbance {filtered:.0f} rad/s2 (10 ms mean) at t = {sample.t:.3f} s; "
+                f"the limit is {self._limit:g} rad/s2.",
+                "The arm does not answer the voltage as [model] says: check polarity, motor power, the encoder's "
+                "cable, and that the voltage fed back is the one really applied.",
+            )
