@@ -1,0 +1,116 @@
+"""The simulated rig as a backend: virtual time, paced by whatever clock it is given."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Self
+
+from dcmp_hil.errors import LinkError
+from dcmp_hil.values import Sample, Truth
+from sim_backend.amplifier import Amplifier
+from sim_backend.encoder import Encoder
+from sim_backend.plant import EulerPlant, MoreauPlant, Plant
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+
+_PLANTS = {"moreau": MoreauPlant, "euler": EulerPlant}
+_FORGIVEN = 10  # periods behind, after which the pace starts afresh instead of being caught up
+
+
+class SimBackend:
+    """Plant, encoder and amplifier behind read and write.
+
+    Under a SimulatedClock a run is as fast as its arithmetic and the same to the bit every time; under a
+    MonotonicClock it keeps the pace of the wall.
+
+    Parameters
+    ----------
+    rig
+        Its `[sim]`, `[model]`, `[encoder]`, `[amplifier]` and `[loop]` tables are used.
+    clock
+        What to sleep on.
+    """
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        self._clock = clock
+        self._period = rig.period
+        self._period_ns = 1e9 * rig.period
+        self._start_ns = 0
+        self._tick = 0
+        self._plant = _plant(rig)
+        self._encoder = Encoder(
+            rig.encoder.counts,
+            phase=rig.sim.encoder_phase_counts,
+            noise=rig.sim.encoder_noise_counts,
+            seed=rig.sim.seed,
+        )
+        self._amplifier = Amplifier(
+            limit=rig.amplifier.limit,
+            slew=rig.amplifier.slew * rig.period,
+            dead_zone=rig.sim.dead_zone_V,
+            quantum=rig.sim.voltage_step_mV * 1e-3,
+            delay_samples=rig.loop.delay_samples,
+        )
+        self._truth = Truth(rig.sim.position_rad, 0.0, math.nan)
+
+    def __enter__(self) -> Self:
+        """Switch the amplifier on, at 0 V."""
+        self._amplifier.live = True
+        self._start_ns = self._clock.now_ns()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Go to 0 V and stay there."""
+        self._amplifier.release()
+
+    def read(self) -> Sample:
+        """Advance the plant to the next tick and return what its encoder shows.
+
+        Raises
+        ------
+        LinkError
+            If the backend is not open.
+        """
+        if not self._amplifier.live:
+            raise LinkError("The simulated rig is closed. Use it as a context manager: with backend: ...")
+        voltage = 0.0
+        if self._tick:
+            voltage = self._amplifier.step()
+            self._truth = self._plant.advance(voltage)
+        tick = self._tick
+        self._tick = tick + 1
+        self._keep_pace(tick)
+        return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+
+    def write(self, voltage: float) -> None:
+        """Hand a voltage to the amplifier, V."""
+        self._amplifier.command(voltage)
+
+    def truth(self) -> Truth:
+        """Return the true state at the last sample."""
+        return self._truth
+
+    @property
+    def live(self) -> bool:
+        """Whether the amplifier is on; off, it puts out 0 V whatever it is told."""
+        return self._amplifier.live
+
+    def _keep_pace(self, tick: int) -> None:
+        deadline_ns = self._start_ns + round(tick * self._period_ns)
+        self._clock.sleep_until_ns(deadline_ns)
+        behind_ns = self._clock.now_ns() - deadline_ns
+        if behind_ns > _FORGIVEN * self._period_ns:
+            self._start_ns += behind_ns  # after a stop of the process: no burst of old periods
+
+
+def _plant(rig: Rig) -> Plant:
+    steps = rig.plant_steps
+    return _PLANTS[rig.sim.integrator](
+        rig.plant, rig.model.values(), position=rig.sim.position_rad, step=rig.period / steps, steps=steps
+    )

@@ -1,0 +1,37 @@
+"""The encoder: true position to counted position, with noise on request."""
+
+from __future__ import annotations
+
+import math
+import random
+
+
+class Encoder:
+    """A quantiser.
+
+    Parameters
+    ----------
+    counts_per_rev
+        Counts a revolution; None for an ideal encoder.
+    phase
+        Counts, where between two edges the zero lies; the mean error is 0 at every phase.
+    noise
+        Counts (rad with an ideal encoder), standard deviation of a Gaussian before the quantiser.
+    seed
+        Of the noise.
+    """
+
+    def __init__(self, counts_per_rev: float | None, *, phase: float, noise: float, seed: int) -> None:
+        self._count = 2.0 * math.pi / counts_per_rev if counts_per_rev else None
+        self._phase = phase
+        self._noise = noise
+        self._random = random.Random(seed)  # noqa: S311 - a simulation must repeat itself, not be secret
+
+    def read(self, position: float) -> float:
+        """Return the measured position, rad."""
+        if self._count is None:
+            return position + self._random.gauss(0.0, self._noise) if self._noise else position
+        counts = position / self._count + self._phase
+        if self._noise:
+            counts += self._random.gauss(0.0, self._noise)
+        return self._count * (math.floor(counts + 0.5) - self._phase)

@@ -1,0 +1,100 @@
+"""The pendulum's physics, eqs. (1)-(4): a set-valued friction that can stick, or the paper's naive Euler."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from dcmp_hil.values import Truth
+
+if TYPE_CHECKING:
+    from dcmp_hil.model import Model
+
+
+class Plant(Protocol):
+    """What the backend asks of a plant."""
+
+    def advance(self, voltage: float) -> Truth:
+        """Hold `voltage` (V) for one period and return the state at its end."""
+        ...
+
+
+class MoreauPlant:
+    """Coulomb friction as a set, time-stepped after Moreau (Acary and Brogliato 2008).
+
+    Each step first finds the velocity without friction, then lets friction take away what it can: the arm
+    really sticks, and w is defined at a reversal. The external disturbance is held over a period.
+
+    Parameters
+    ----------
+    plant
+        What the simulation is.
+    model
+        What the host believes: the true w of eq. (3) is defined by the believed f0 and ku/J.
+    position
+        rad, at rest, at the start.
+    step
+        s.
+    steps
+        Steps in a period.
+    """
+
+    def __init__(self, plant: Model, model: Model, *, position: float, step: float, steps: int) -> None:
+        self._plant = plant
+        self._f0, self._ku = model.f0, model.ku
+        self._step, self._steps = step, range(steps)
+        self._periods = 0
+        self._x1, self._x2 = position, 0.0
+
+    def advance(self, voltage: float) -> Truth:
+        """Hold `voltage` (V) for one period and return the state at its end."""
+        f0, f1, gravity, ku, *_ = self._plant
+        h, sin = self._step, math.sin
+        x1, x2 = self._x1, self._x2
+        held = self._plant.external(self._periods * len(self._steps) * h) + ku * voltage
+        most = h * f1
+        before = x2
+        for _ in self._steps:
+            before = x2
+            x2 += h * (held - f0 * x2 - gravity * sin(x1))
+            x2 = x2 - most if x2 > most else x2 + most if x2 < -most else 0.0
+            x1 += h * x2
+        self._x1, self._x2 = x1, x2
+        self._periods += 1
+        return Truth(x1, x2, (x2 - before) / h + self._f0 * before - self._ku * voltage)
+
+
+class EulerPlant:
+    """The paper's own simulation: explicit Euler, friction by a sign that chatters at rest.
+
+    Parameters
+    ----------
+    plant, model, position, step, steps
+        As for MoreauPlant.
+    """
+
+    def __init__(self, plant: Model, model: Model, *, position: float, step: float, steps: int) -> None:
+        self._plant = plant
+        self._f0, self._ku = model.f0, model.ku
+        self._step, self._steps = step, steps
+        self._done = 0
+        self._x1, self._x2 = position, 0.0
+
+    def advance(self, voltage: float) -> Truth:
+        """Hold `voltage` (V) for one period and return the state at its end."""
+        f0, _, _, ku, *_ = self._plant
+        h = self._step
+        x1, x2, w = self._x1, self._x2, 0.0
+        for _ in range(self._steps):
+            w = self._disturbance(x1, x2, self._done * h)
+            slope = -f0 * x2 + w + ku * voltage
+            x1, x2 = x1 + h * x2, x2 + h * slope
+            self._done += 1
+        self._x1, self._x2 = x1, x2
+        now = self._disturbance(x1, x2, self._done * h)
+        return Truth(x1, x2, now + (self._f0 - f0) * x2 + (ku - self._ku) * voltage)
+
+    def _disturbance(self, x1: float, x2: float, t: float) -> float:
+        """Return w of eq. (2), rad/s2."""
+        sign = math.copysign(1.0, x2) if x2 != 0.0 else 0.0
+        return -self._plant.f1 * sign + self._plant.external(t) - self._plant.gravity * math.sin(x1)
