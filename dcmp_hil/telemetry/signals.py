@@ -1,0 +1,77 @@
+"""The one table of signals: plots, result columns and CSV all follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.block import Block
+
+TRUE = (125, 145, 165)  # grey-blue: measured or true
+ESTIMATE = (255, 160, 40)  # orange
+REFERENCE = (90, 190, 95)  # green
+ERROR = (240, 80, 80)  # red
+VOLTAGE = (70, 150, 245)  # blue
+DEMAND = (150, 190, 240)  # pale blue
+TIMING = (190, 90, 200)  # purple
+FAINT = (150, 150, 150)
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One line of one plot, and one column of every table."""
+
+    column: str  # with its unit
+    plot: str  # entity path, with its unit
+    label: str
+    colour: tuple[int, int, int]
+    read: Callable[[Block], NDArray[np.float64]]
+
+
+SIGNALS = (
+    Signal("position_rad", "joint/position_rad", "measured", TRUE, lambda b: b["position"]),
+    Signal("position_true_rad", "joint/position_rad", "true (sim)", FAINT, lambda b: b["position_true"]),
+    Signal("position_estimate_rad", "joint/position_rad", "estimate", ESTIMATE, lambda b: b["position_estimate"]),
+    Signal("position_reference_rad", "joint/position_rad", "reference", REFERENCE, lambda b: b.reference[:, 0]),
+    Signal("velocity_true_rad_s", "joint/velocity_rad_s", "true (sim)", TRUE, lambda b: b["velocity_true"]),
+    Signal("velocity_estimate_rad_s", "joint/velocity_rad_s", "estimate", ESTIMATE, lambda b: b["velocity_estimate"]),
+    Signal("velocity_reference_rad_s", "joint/velocity_rad_s", "reference", REFERENCE, lambda b: b.reference[:, 1]),
+    Signal(
+        "disturbance_true_rad_s2", "joint/disturbance_rad_s2", "true (sim)", TRUE, lambda b: b["disturbance_true"]
+    ),
+    Signal(
+        "disturbance_estimate_rad_s2",
+        "joint/disturbance_rad_s2",
+        "estimate",
+        ESTIMATE,
+        lambda b: b["disturbance_estimate"],
+    ),
+    Signal(
+        "tracking_error_mrad", "control/tracking_error_mrad", "tracking error", ERROR, lambda b: 1e3 * b.tracking_error
+    ),
+    Signal("voltage_demand_V", "control/voltage_V", "demanded", DEMAND, lambda b: b["voltage_demand"]),
+    Signal("voltage_sent_V", "control/voltage_V", "sent", FAINT, lambda b: b["voltage_sent"]),
+    Signal("voltage_applied_V", "control/voltage_V", "applied", VOLTAGE, lambda b: b["voltage_applied"]),
+    Signal("period_us", "loop/period_us", "period", TIMING, lambda b: 1e6 * b["period"]),
+    Signal("lateness_us", "loop/lateness_us", "lateness", ERROR, lambda b: 1e6 * b["lateness"]),
+    Signal("compute_us", "loop/lateness_us", "compute", FAINT, lambda b: 1e6 * b["compute"]),
+)
+
+
+def columns(block: Block) -> dict[str, NDArray[np.float64]]:
+    """Read every signal of the table from `block`: column name to shape (n,); `time_s` comes first."""
+    return {"time_s": block["t"], **{signal.column: signal.read(block) for signal in SIGNALS}}
+
+
+def by_plot() -> dict[str, list[Signal]]:
+    """Group the table by plot, both in the table's order."""
+    plots: dict[str, list[Signal]] = {}
+    for signal in SIGNALS:
+        plots.setdefault(signal.plot, []).append(signal)
+    return plots

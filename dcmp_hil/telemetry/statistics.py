@@ -1,0 +1,181 @@
+"""The figures of a run, block by block, in bounded memory."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.values import Event
+
+_LATE = 0.5  # of a period: a sample that arrives later than this counts as late
+
+
+@dataclass(frozen=True, slots=True)
+class Percentiles:
+    """Quantiles of a duration, us; NaN where there was none. The maximum is exact, the others to 0.5 %."""
+
+    p50: float
+    p99: float
+    p999: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The figures of a run, over `window_s` of device time; the names are a promise.
+
+    Errors are against the truth where it is known (the simulated rig); tracking then means the true
+    position minus the reference at the same instant, otherwise the measured one. None: not known.
+    """
+
+    tracking_rms_rad: float | None
+    tracking_max_rad: float | None
+    velocity_error_rms_rad_s: float | None
+    velocity_error_max_rad_s: float | None
+    disturbance_error_rms_rad_s2: float | None
+    voltage_peak_V: float | None
+    voltage_tv_V_s: float | None
+    """Total variation of the voltage sent, per second."""
+    periods: int
+    late_periods: int
+    """Periods whose sample arrived more than half a period late."""
+    period_us: Percentiles
+    lateness_us: Percentiles
+    realtime_factor: float
+    """Device time over wall time, the whole run."""
+    window_s: tuple[float, float]
+
+
+class Error:
+    """Root mean square and maximum of a column that comes in pieces; NaN is left out."""
+
+    def __init__(self) -> None:
+        self._n, self._squares, self._max = 0, 0.0, 0.0
+
+    def add(self, values: NDArray[np.float64]) -> None:
+        """Take the next piece."""
+        known = values[~np.isnan(values)]
+        if len(known):
+            self._n += len(known)
+            self._squares += float(known @ known)
+            self._max = max(self._max, float(np.abs(known).max()))
+
+    @property
+    def rms(self) -> float | None:
+        """Root mean square."""
+        return math.sqrt(self._squares / self._n) if self._n else None
+
+    @property
+    def max(self) -> float | None:
+        """Largest absolute value."""
+        return self._max if self._n else None
+
+
+class Durations:
+    """Quantiles of durations, by a histogram with bins of 1 % from 10 ns to 1000 s."""
+
+    _FIRST, _BINS_E = 1e-8, 100.0  # s; bins an e-fold
+    _N = int(_BINS_E * math.log(1e11)) + 2
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(self._N, np.int64)
+        self._min, self._max = math.inf, -math.inf
+
+    def add(self, values: NDArray[np.float64]) -> None:
+        """Take the next piece, s; NaN is left out."""
+        known = values[~np.isnan(values)]
+        if not len(known):
+            return
+        bins = np.log(np.maximum(known, self._FIRST) / self._FIRST) * self._BINS_E
+        self.counts += np.bincount(np.minimum(bins.astype(np.int64), self._N - 1), minlength=self._N)
+        self._min, self._max = min(self._min, float(known.min())), max(self._max, float(known.max()))
+
+    def percentiles(self) -> Percentiles:
+        """Return the quantiles in us."""
+        total = int(self.counts.sum())
+        if not total:
+            return Percentiles(math.nan, math.nan, math.nan, math.nan)
+        ranks = np.ceil(np.array([0.5, 0.99, 0.999]) * total)
+        bins = np.searchsorted(np.cumsum(self.counts), ranks)
+        middle = self._FIRST * np.exp((bins + 0.5) / self._BINS_E)
+        p50, p99, p999 = (round(1e6 * float(v), 3) for v in np.clip(middle, self._min, self._max))
+        return Percentiles(p50, p99, p999, round(1e6 * self._max, 3))
+
+
+class Statistics:
+    """A sink that makes the Summary.
+
+    Parameters
+    ----------
+    period
+        s, nominal.
+    window_from, window_to
+        s, device time; periods outside count for nothing but `realtime_factor`.
+    """
+
+    def __init__(self, period: float, window_from: float = 0.0, window_to: float = math.inf) -> None:
+        self._period = period
+        self._from, self._to = window_from, window_to
+        self._tracking, self._velocity, self._disturbance = Error(), Error(), Error()
+        self.period, self.lateness = Durations(), Durations()
+        self._periods = self._late = 0
+        self._peak = self._variation = 0.0
+        self._last_voltage = math.nan
+        self._first_t = self._last_t = math.nan
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        t = block["t"]
+        inside = np.flatnonzero((t >= self._from - 0.5 * self._period) & (t < self._to))
+        if not len(inside):
+            return
+        window = slice(int(inside[0]), int(inside[-1]) + 1)
+        self._tracking.add(block.tracking_error[window])
+        self._velocity.add((block["velocity_estimate"] - block["velocity_true"])[window])
+        self._disturbance.add((block["disturbance_estimate"] - block["disturbance_true"])[window])
+        self.period.add(block["period"][window])
+        self.lateness.add(block["lateness"][window])
+        self._periods += len(inside)
+        self._late += int((block["lateness"][window] > _LATE * self._period).sum())
+        self._add_voltage(block["voltage_sent"][window])
+        if math.isnan(self._first_t):
+            self._first_t = float(t[window][0])
+        self._last_t = float(t[window][-1])
+
+    def event(self, event: Event) -> None:
+        """Events are no figures."""
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def summary(self, realtime_factor: float) -> Summary:
+        """Return the figures so far."""
+        span = self._last_t - self._first_t
+        return Summary(
+            tracking_rms_rad=self._tracking.rms,
+            tracking_max_rad=self._tracking.max,
+            velocity_error_rms_rad_s=self._velocity.rms,
+            velocity_error_max_rad_s=self._velocity.max,
+            disturbance_error_rms_rad_s2=self._disturbance.rms,
+            voltage_peak_V=self._peak if self._periods else None,
+            voltage_tv_V_s=self._variation / span if span > 0 else None,
+            periods=self._periods,
+            late_periods=self._late,
+            period_us=self.period.percentiles(),
+            lateness_us=self.lateness.percentiles(),
+            realtime_factor=realtime_factor,
+            window_s=(self._first_t, self._last_t + self._period) if self._periods else (self._from, self._from),
+        )
+
+    def _add_voltage(self, voltage: NDArray[np.float64]) -> None:
+        self._peak = max(self._peak, float(np.abs(voltage).max()))
+        steps = np.abs(np.diff(voltage, prepend=self._last_voltage))
+        self._variation += float(np.nansum(steps))  # the very first has nothing before it
+        self._last_voltage = float(voltage[-1])
