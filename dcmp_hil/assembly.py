@@ -1,0 +1,120 @@
+"""From a rig to the stages of its line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil import controllers, observers
+from dcmp_hil.backends import open_backend
+from dcmp_hil.config.sections import Custom
+from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.loop import Line
+from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
+from dcmp_hil.observers.known_friction import KnownFriction
+from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.plugins import find_named
+from dcmp_hil.predictor import Predictor
+from dcmp_hil.supervisor import Supervisor
+from dcmp_hil.telemetry.block import Aligner
+from dcmp_hil.telemetry.recorder import Recorder
+from dcmp_hil.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.controllers import Controller
+    from dcmp_hil.observers import Observer
+    from dcmp_hil.telemetry.recorder import Sink
+    from dcmp_hil.values import Event
+
+_SETTLE, _ENGAGE = 0.25, 0.25  # s: ten time constants of the observer, then a ramp of authority
+_WATCH_FLOOR = 100.0  # rad/s, mu0 of the watching observer
+
+
+def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) -> tuple[Line, Recorder]:
+    """Make every stage of the line, and the recorder that it reports to.
+
+    Raises
+    ------
+    ConfigError
+        If a class named `module:Class` cannot be found or made.
+    """
+    backend = open_backend(rig, clock)
+    trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
+    recorder = Recorder(
+        backend.truth,
+        Aligner(trajectory.at, rig.delay),
+        sinks,
+        recent=max(1, round(rig.loop.rate_hz)),
+        in_line=in_line,
+    )
+    measured = isinstance(rig.controller, PdSettings) and rig.controller.position == "measured"
+    line = Line(
+        backend=backend,
+        observer=make_observer(rig, trajectory),
+        predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
+        trajectory=trajectory,
+        controller=make_controller(rig),
+        supervisor=make_supervisor(rig, recorder.event),
+        telemetry=recorder,
+        clock=clock,
+        delay=rig.delay,
+    )
+    return line, recorder
+
+
+def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
+    """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
+    setting = observers.Setting(rig.model.values(), rig.period, rig.encoder.counts)
+    observer: Observer = (
+        _make_custom(rig.observer, setting, "observer")
+        if isinstance(rig.observer, Custom)
+        else rig.observer.build(setting)
+    )
+    if isinstance(rig.controller, PdSettings) and rig.controller.friction_feedforward:
+        return KnownFriction(observer, setting, trajectory.at, rig.delay)
+    return observer
+
+
+def make_controller(rig: Rig) -> Controller:
+    """Make the controller that `[controller]` asks for."""
+    setting = controllers.Setting(rig.model.values(), rig.period)
+    if isinstance(rig.controller, Custom):
+        custom: Controller = _make_custom(rig.controller, setting, "controller")
+        return custom
+    return rig.controller.build(setting)
+
+
+def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
+    """Make the supervisor with the monitors that `[supervisor]` asks for."""
+    limits = rig.supervisor
+    monitors: list[Monitor] = [Finite()]
+    if limits.monitors == "all":
+        setting = observers.Setting(rig.model.values(), rig.period, rig.encoder.counts)
+        watch = SuperTwisting(setting, mu0=min(_WATCH_FLOOR, 0.3 / rig.period))
+        monitors += [
+            Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
+            DisturbanceWatch(watch, rig.period, limits.disturbance_limit_rad_s2),
+        ]
+    immediate = limits.start == "immediate"
+    return Supervisor(
+        monitors,
+        voltage_limit=rig.amplifier.limit,
+        settle=0.0 if immediate else _SETTLE,
+        engage=0.0 if immediate else _ENGAGE,
+        notify=notify,
+    )
+
+
+def _make_custom(section: Custom, setting: object, key: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+    make = find_named(section.kind, f"{key}.kind")
+    try:
+        return make(setting, **section.options)
+    except TypeError as error:
+        raise ConfigError(
+            f"{key}.kind: {section.kind} could not be made: {error}. "
+            f"It is called as Class(setting, **options) with the keys of [{key}.options]."
+        ) from error

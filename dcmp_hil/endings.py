@@ -1,0 +1,46 @@
+"""How a run ends from outside: Ctrl-C and signals become a request that the loop sees once a period."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from types import FrameType, TracebackType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class StopRequest:
+    """Turns SIGINT, SIGTERM and SIGHUP into `requested` while it is entered.
+
+    A second SIGINT raises KeyboardInterrupt at once: the way out of a stage that hangs. Outside the main
+    thread, where Python allows no handlers, only `requested` itself works.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self.signal: signal.Signals | None = None  # what asked, if a signal did
+        self._before: dict[signal.Signals, object] = {}
+
+    def __enter__(self) -> Self:
+        """Install the handlers."""
+        if threading.current_thread() is threading.main_thread():
+            for number in _SIGNALS:
+                self._before[number] = signal.signal(number, self._ask)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Put the handlers of before back."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        self._before.clear()
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.requested and number == signal.SIGINT:
+            signal.default_int_handler(number, frame)
+        self.requested = True
+        self.signal = self.signal or signal.Signals(number)

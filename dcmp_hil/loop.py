@@ -1,0 +1,103 @@
+"""The loop: one period is one straight line, and everything else exists to keep it so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from dcmp_hil.values import Cycle, Timing
+
+if TYPE_CHECKING:
+    from dcmp_hil.backends import Backend
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.controllers import Controller
+    from dcmp_hil.observers import Observer
+    from dcmp_hil.predictor import Predictor
+    from dcmp_hil.supervisor import Supervisor
+    from dcmp_hil.trajectory import Trajectory
+
+
+class Telemetry(Protocol):
+    """Whoever wants to see the periods; must return at once."""
+
+    def record(self, cycle: Cycle) -> None:
+        """Take one period."""
+        ...
+
+
+class Stop(Protocol):
+    """Whether somebody asked for the end."""
+
+    requested: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The stages of a period, in the order in which a sample passes them."""
+
+    backend: Backend
+    observer: Observer
+    predictor: Predictor
+    trajectory: Trajectory
+    controller: Controller
+    supervisor: Supervisor
+    telemetry: Telemetry
+    clock: Clock
+    delay: float  # s, from a sample to the instant at which its command acts
+
+
+def run(line: Line, until: float, stop: Stop) -> float:
+    """Run periods until device time reaches `until`, or somebody asks for the end.
+
+    The backend must be open, and whoever opened it closes it: that drives 0 V however this ends.
+
+    Parameters
+    ----------
+    line
+        The stages.
+    until
+        s, device time; the period whose sample is at or after it is the last.
+    stop
+        Looked at once a period.
+
+    Returns
+    -------
+    float
+        Device time of the last sample, s.
+
+    Raises
+    ------
+    TripError
+        If the supervisor trips; 0 V has been written by then.
+    BackendError
+        If the device or the way to it fails.
+    """
+    backend, trajectory, supervisor, clock, delay = (
+        line.backend, line.trajectory, line.supervisor, line.clock, line.delay,
+    )  # fmt: skip
+    observer, predictor, controller, telemetry = line.observer, line.predictor, line.controller, line.telemetry
+    previous, first = math.nan, math.nan
+
+    while True:
+        sample = backend.read()
+        arrived = clock.now_ns() * 1e-9
+        estimate = observer.update(sample)
+        if supervisor.engages(sample):
+            trajectory.begin(sample.t, estimate.position)
+        ahead = predictor.ahead(sample, estimate)
+        reference = trajectory.at(sample.t + delay)
+        demand = controller.update(reference, ahead)
+        voltage = supervisor.admit(sample, estimate, demand)
+        backend.write(voltage)
+        predictor.sent(voltage)
+        if first != first:
+            first = arrived - sample.t
+        timing = Timing(arrived - previous, arrived - first - sample.t, clock.now_ns() * 1e-9 - arrived)
+        telemetry.record(Cycle(sample, estimate, reference, demand, voltage, timing))
+        previous = arrived
+
+        if supervisor.trip is not None:
+            raise supervisor.trip
+        if sample.t >= until or stop.requested:
+            return sample.t

@@ -1,0 +1,193 @@
+"""One run from rig to result: builds the line, runs it, ends it at 0 V, and keeps the figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dcmp_hil import loop
+from dcmp_hil.assembly import assemble
+from dcmp_hil.clock import MonotonicClock, SimulatedClock
+from dcmp_hil.endings import StopRequest
+from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.telemetry.keeper import Keeper
+from dcmp_hil.telemetry.statistics import Statistics, Summary
+from dcmp_hil.trajectory import LOWERING
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.telemetry.recorder import Sink
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a run leaves behind.
+
+    Parameters
+    ----------
+    rig
+        What was run.
+    summary
+        The figures.
+    columns
+        Every signal of the table, shape (periods,), by name with unit; `time_s` is device time. Empty if
+        columns were not kept.
+    events
+        What happened, in order.
+    dropped
+        Periods that telemetry lost because a sink was slow; they are in no figure.
+    """
+
+    rig: Rig
+    summary: Summary
+    columns: dict[str, NDArray[np.float64]]
+    events: tuple[Event, ...]
+    dropped: int = 0
+
+
+class Session:
+    """A run that can be asked for its result however it ended.
+
+    Parameters
+    ----------
+    rig
+        What to run.
+    duration
+        s; None takes `run.duration_s`; 0 is until stopped.
+    fast
+        Virtual time, as fast as the arithmetic; only the simulated rig can.
+    window_from
+        s, device time from which the figures count.
+    sinks
+        Who else looks on.
+    keep_columns
+        False for long runs: memory then stays bounded.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        duration: float | None = None,
+        fast: bool = False,
+        window_from: float = 0.0,
+        sinks: Sequence[Sink] = (),
+        keep_columns: bool = True,
+    ) -> None:
+        length = rig.run.duration_s if duration is None else duration
+        _check_times(rig, length, window_from, fast=fast)
+        self.rig = rig
+        self._length = length or math.inf
+        self._statistics = Statistics(rig.period, window_from)
+        self._keeper = Keeper() if keep_columns else None
+        self._wall = MonotonicClock()
+        own: list[Sink] = [self._statistics, *([self._keeper] if self._keeper else [])]
+        clock = SimulatedClock() if fast else self._wall
+        self.stop = StopRequest()
+        self._line, self._recorder = assemble(rig, clock, [*own, *sinks], in_line=fast)
+        self._realtime_factor = math.nan
+
+    def run(self) -> None:
+        """Run to the end; whatever the end is, the amplifier is at 0 V and the sinks are closed after it.
+
+        Raises
+        ------
+        TripError
+            With the last second of cycles.
+        BackendError
+            If the device or the way to it fails.
+        """
+        line, recorder = self._line, self._recorder
+        began_ns, t = self._wall.now_ns(), 0.0
+        try:
+            with self.stop, line.backend:
+                t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
+                if self.rig.run.end == "lower" and not self.stop.requested:
+                    recorder.event(Event(t, "INFO", "lowering the arm"))
+                    line.trajectory.lower(t + line.delay)
+                    t = loop.run(line, t + line.delay + LOWERING, self.stop)
+        except TripError as trip:
+            trip.cycles = tuple(recorder.recent)
+            t = trip.cycles[-1].sample.t
+            recorder.event(Event(t, "ERROR", f"tripped ({trip.reason}): {trip}"))
+            raise
+        finally:
+            wall = 1e-9 * (self._wall.now_ns() - began_ns)
+            self._realtime_factor = t / wall if wall > 0 else math.nan
+            recorder.event(Event(t, "INFO", "amplifier at 0 V"))
+            recorder.close()
+
+    def result(self) -> Result:
+        """Return what there is, complete or not."""
+        return Result(
+            rig=self.rig,
+            summary=self._statistics.summary(self._realtime_factor),
+            columns=self._keeper.columns() if self._keeper else {},
+            events=tuple(self._keeper.events) if self._keeper else (),
+            dropped=self._recorder.dropped,
+        )
+
+
+def run(
+    rig: Rig,
+    *,
+    duration: float | None = None,
+    fast: bool = False,
+    window_from: float = 0.0,
+    sinks: Sequence[Sink] = (),
+) -> Result:
+    """Run a rig and return its cycles as columns and its figures.
+
+    Parameters
+    ----------
+    rig
+        From `load_rig`.
+    duration
+        s of device time; None takes the rig's own `run.duration_s`; 0 is until Ctrl-C.
+    fast
+        Virtual time instead of the wall's pace (simulated rig only); such runs repeat to the bit.
+    window_from
+        s, device time from which the summary's figures count.
+    sinks
+        Who else looks on, such as a RerunSink.
+
+    Returns
+    -------
+    Result
+        Columns, summary and events. After Ctrl-C: of what ran until then.
+
+    Raises
+    ------
+    ConfigError
+        If an argument does not fit the rig.
+    TripError
+        If the supervisor stopped the run; `.cycles` holds the last second.
+    BackendError
+        If the device or the way to it fails.
+    """
+    session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks)
+    session.run()
+    return session.result()
+
+
+def _check_times(rig: Rig, length: float, window_from: float, *, fast: bool) -> None:
+    if not 0.0 <= length < math.inf:
+        raise ConfigError(f"duration: got {length}; expected seconds, 0 (until Ctrl-C) or more.")
+    if not 0.0 <= window_from < (length or math.inf):
+        raise ConfigError(
+            f"from: got {window_from} s, outside the run of {length:g} s. Choose an earlier start of the window, "
+            "or a longer duration."
+        )
+    if fast and length == 0.0:
+        raise ConfigError("duration: 0 (until Ctrl-C) and virtual time would never end. Give a duration.")
+    if fast and rig.backend.kind != "sim" and ":" not in rig.backend.kind:
+        raise ConfigError(
+            f'fast: backend.kind = "{rig.backend.kind}" runs in real time; virtual time needs backend.kind = "sim".'
+        )
