@@ -124,8 +124,8 @@ class SuperTwisting:
         b = y - self._z1 - v1
         k1, k2, k3 = gains if abs(b) >= self._floor_from else self._sliding_gains(b, dt)
         self._v1 = v1 = v1 + k1 * b
-        self._v2 = v2 = v2 + k2 * b / dt
-        self._v3 = v3 = v3 + k3 * b / (dt * dt)
+        self._v2 = v2 = v2 + k2 * b
+        self._v3 = v3 = v3 + k3 * b
         self._t, self._y = t, y
         return Estimate(
             self._z1 + v1, self._z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1
@@ -140,7 +140,7 @@ class SuperTwisting:
 
     def _solve(self, dt: float) -> tuple[Copy, Gains]:
         """Everything that depends on the step alone."""
-        return luenberger_copy(dt, self._f0, self._L1, self._L2), matched_gains(self.mu0 * dt)
+        return luenberger_copy(dt, self._f0, self._L1, self._L2), _per_step(matched_gains(self.mu0 * dt), dt)
 
     def _step(self, dt: float) -> tuple[Copy, Gains] | None:
         """Find the coefficients of a step that is not one period; None where nothing can be continued."""
@@ -160,4 +160,9 @@ class SuperTwisting:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
         size = abs(b)
         mu = self.mu0 if size < _NOTHING else (self.M / size) ** (1 / 3)
-        return matched_gains(mu * dt)
+        return _per_step(matched_gains(mu * dt), dt)
+
+
+def _per_step(gains: Gains, dt: float) -> Gains:
+    """Scale to what b itself is multiplied with: v2 += k2 b / T, v3 += k3 b / T^2."""
+    return Gains(gains.k1, gains.k2 / dt, gains.k3 / (dt * dt))

@@ -1,0 +1,143 @@
+"""`make bench`: what things cost, as a table and as JSON; ratios are taken within one run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dcmp_hil import load_rig, loop, run
+from dcmp_hil.assembly import assemble
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.observers import Setting
+from dcmp_hil.observers.paper import PaperObserver
+from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.values import Cycle, Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.observers import Observer
+
+_ROUNDS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One measured figure: the median of some rounds, and their range."""
+
+    what: str
+    median: float
+    low: float
+    high: float
+    unit: str
+    goal: str
+
+
+class _Nobody:
+    """Telemetry off, and nobody who stops the run."""
+
+    requested = False
+
+    def record(self, cycle: Cycle) -> None:
+        """Forget it."""
+
+
+def _row(what: str, unit: str, goal: str, measure: Callable[[], float]) -> Row:
+    values = [measure() for _ in range(_ROUNDS)]
+    return Row(what, statistics.median(values), min(values), max(values), unit, goal)
+
+
+def _line_factor(rig: Rig, *, telemetry: bool, seconds: float = 20.0) -> float:
+    """Device time over CPU time of the whole loop, in virtual time."""
+    line, _ = assemble(rig, SimulatedClock(), [], in_line=True)
+    if not telemetry:
+        line = replace(line, telemetry=_Nobody())
+    with line.backend:
+        began = time.process_time()
+        loop.run(line, seconds, _Nobody())
+        return seconds / (time.process_time() - began)
+
+
+def _whole_factor(rig: Rig, seconds: float = 20.0) -> float:
+    """Device time over CPU time of `run()`: figures and all columns kept."""
+    began = time.process_time()
+    run(rig, duration=seconds, fast=True)
+    return seconds / (time.process_time() - began)
+
+
+def _step_us(make: Callable[[], Observer]) -> float:
+    """Cost of one observer step on a quantised sine, us."""
+    count = 2 * math.pi / 4096
+    samples = [Sample(1e-3 * k, count * round(math.sin(5e-4 * k) / count), 1.0) for k in range(20_000)]
+    update = make().update
+    began = time.process_time()
+    for sample in samples:
+        update(sample)
+    return 1e6 * (time.process_time() - began) / len(samples)
+
+
+def _command_s(*arguments: str) -> float:
+    began = time.perf_counter()
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - began
+
+
+def _rows() -> list[Row]:
+    bench, coarse = load_rig("bench-1khz"), load_rig("bench-1khz", ["sim.step_us=500"])
+    setting = Setting(bench.model.values(), bench.period, bench.encoder.counts)
+    return [
+        _row("loop in virtual time, telemetry off, plant step 200 us", "x", ">= 100", lambda: _line_factor(bench, telemetry=False)),
+        _row("loop in virtual time, telemetry off, plant step 500 us", "x", ">= 100", lambda: _line_factor(coarse, telemetry=False)),
+        _row("loop in virtual time, ring and black box on, 200 us", "x", "", lambda: _line_factor(bench, telemetry=True)),
+        _row("run(), figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
+        _row("super_twisting (R1), one step", "us", "<= 2", lambda: _step_us(lambda: SuperTwisting(setting))),
+        _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
+        _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
+        _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
+    ]
+
+
+def _figures(step_us: float) -> dict[str, float | None]:
+    """Show that the figures of the default rig hold at the plant step that was timed."""
+    overrides = ["supervisor.start=immediate", "sim.position_rad=-1.57", f"sim.step_us={step_us}"]
+    figures = run(load_rig("bench-1khz", overrides), duration=30.13, fast=True, window_from=5.0).summary
+    tracking = figures.tracking_rms_rad
+    return {
+        "plant_step_us": step_us,
+        "tracking_rms_mrad": None if tracking is None else 1e3 * tracking,
+        "velocity_error_rms_rad_s": figures.velocity_error_rms_rad_s,
+        "disturbance_error_rms_rad_s2": figures.disturbance_error_rms_rad_s2,
+        "voltage_tv_V_s": figures.voltage_tv_V_s,
+    }
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", type=Path, default=Path("bench.json"), metavar="FILE")
+    target: Path = parser.parse_args().json
+    rows = _rows()
+    figures = [_figures(step) for step in (20.0, 200.0, 500.0)]
+    write = sys.stdout.write
+    write(f"{'':56}{'median':>10}{'min':>10}{'max':>10}  unit  goal\n")
+    for row in rows:
+        write(f"{row.what:56}{row.median:10.3f}{row.low:10.3f}{row.high:10.3f}  {row.unit:4}  {row.goal}\n")
+    write("\nthe figures at these plant steps (theory: tracking < .28 mrad, v < .0075, w < .28, TV 60 to 80)\n")
+    for row_of_figures in figures:
+        write("  ".join(f"{name} {value:.4g}" for name, value in row_of_figures.items()) + "\n")
+    document = {"rows": [asdict(row) for row in rows], "figures": figures}
+    target.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    write(f"\nwrote {target}\n")
+
+
+if __name__ == "__main__":
+    main()
