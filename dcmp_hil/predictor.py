@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from typing import TYPE_CHECKING
 
 from dcmp_hil.values import Estimate
@@ -23,7 +22,7 @@ class Predictor:
     period
         s.
     delay_samples
-        Periods between a sample and the instant at which its command takes effect.
+        Periods between a sample and the instant at which its command takes effect: 0 or 1.
     measured
         Start from the encoder's position, as eq. (10) prints it, instead of x1_hat, which is quieter.
     """
@@ -32,22 +31,23 @@ class Predictor:
         self._a, self._p1, self._p2 = held_input(model.f0, period)
         self._ku = model.ku
         self._measured = measured
-        self._under_way = deque([0.0] * delay_samples, maxlen=delay_samples)  # V, oldest first
+        self._delayed = delay_samples == 1
+        self._under_way = 0.0  # V
 
     def ahead(self, sample: Sample, estimate: Estimate) -> Estimate:
         """Return the state at the instant at which the next command takes effect."""
         x1, x2, w = estimate
         if self._measured:
             x1 = sample.position
-        for voltage in self._under_way:
-            drive = w + self._ku * voltage
-            x1 += self._p1 * x2 + self._p2 * drive
-            x2 = self._a * x2 + self._p1 * drive
+        if self._delayed:
+            drive, p1 = w + self._ku * self._under_way, self._p1
+            x1 += p1 * x2 + self._p2 * drive
+            x2 = self._a * x2 + p1 * drive
         return Estimate(x1, x2, w)
 
     def sent(self, voltage: float) -> None:
-        """Remember what was just sent, V."""
-        self._under_way.append(voltage)
+        """Remember what was just sent, V: it is under way until the next sample."""
+        self._under_way = voltage
 
 
 def held_input(f0: float, period: float) -> tuple[float, float, float]:

@@ -39,6 +39,7 @@ class SimBackend:
         self._clock = clock
         self._period = rig.period
         self._period_ns = 1e9 * rig.period
+        self._forgiven_ns = _FORGIVEN * self._period_ns
         self._start_ns = 0
         self._tick = 0
         self._plant = _plant(rig)
@@ -102,10 +103,10 @@ class SimBackend:
         return self._amplifier.live
 
     def _keep_pace(self, tick: int) -> None:
-        deadline_ns = self._start_ns + round(tick * self._period_ns)
+        deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
         self._clock.sleep_until_ns(deadline_ns)
         behind_ns = self._clock.now_ns() - deadline_ns
-        if behind_ns > _FORGIVEN * self._period_ns:
+        if behind_ns > self._forgiven_ns:
             self._start_ns += behind_ns  # after a stop of the process: no burst of old periods
 
 

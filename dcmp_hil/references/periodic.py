@@ -23,11 +23,10 @@ class Sine(ReferenceSettings):
 
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
-        rate, angle = self.rate_rad_s, self.rate_rad_s * t + self.phase_rad
-        swing = self.amplitude_rad * math.sin(angle)
-        return Reference(
-            self.offset_rad + swing, self.amplitude_rad * rate * math.cos(angle), -rate * rate * swing
-        )
+        amplitude, rate = self.amplitude_rad, self.rate_rad_s
+        angle = rate * t + self.phase_rad
+        swing = amplitude * math.sin(angle)
+        return Reference(self.offset_rad + swing, amplitude * rate * math.cos(angle), -rate * rate * swing)
 
 
 class Chirp(ReferenceSettings):

@@ -23,6 +23,7 @@ FIELDS = (
 """Columns of a row, in SI units, in the order in which a Cycle and its Truth are laid out flat."""
 
 _ROW = struct.Struct(f"{len(FIELDS)}d")
+_pack = _ROW.pack_into
 
 
 class Ring:
@@ -44,17 +45,9 @@ class Ring:
 
     def push(self, cycle: Cycle, truth: Truth) -> None:
         """Write one row; constant time, never blocks."""
-        _ROW.pack_into(
-            self._bytes,
-            self._written % self.capacity * _ROW.size,
-            *cycle.sample,
-            *cycle.estimate,
-            *cycle.reference,
-            cycle.demand,
-            cycle.voltage,
-            *cycle.timing,
-            *truth,
-        )
+        sample, estimate, reference, demand, voltage, timing = cycle
+        row = self._written % self.capacity * _ROW.size
+        _pack(self._bytes, row, *sample, *estimate, *reference, demand, voltage, *timing, *truth)
         self._written += 1
 
     def __len__(self) -> int:

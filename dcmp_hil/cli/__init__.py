@@ -1,0 +1,54 @@
+"""The command line: what may print and exit, and nothing else may."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from dcmp_hil import __version__
+from dcmp_hil.cli import console
+from dcmp_hil.cli.check import check
+from dcmp_hil.cli.paper import paper
+from dcmp_hil.cli.replay import replay
+from dcmp_hil.cli.rigs import rigs
+from dcmp_hil.cli.run import run
+from dcmp_hil.errors import DcmpError
+
+app = typer.Typer(
+    help="Run a DC-motor pendulum: observer, controller, amplifier, live picture.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (run, check, paper, replay, rigs):
+    app.command()(command)
+
+
+def _version(value: bool) -> None:
+    if value:
+        console.out.print(f"dcmp-hil {__version__}", highlight=False)
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Run a DC-motor pendulum: observer, controller, amplifier, live picture."""
+
+
+def main() -> None:
+    """Run the command line; every error of this package becomes its message and its exit code."""
+    try:
+        app()
+    except DcmpError as error:
+        console.complain(error)
+        sys.exit(error.exit_code)
+    except BrokenPipeError:  # whoever read our output went away, like `dcmp-hil rigs | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

@@ -1,0 +1,32 @@
+"""`dcmp-hil rigs`: the rigs that come with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dcmp_hil.cli import console
+
+
+def rigs(
+    copy: Annotated[
+        tuple[str, Path] | None,
+        typer.Option("--copy", metavar="NAME FILE", help="Write a commented rig.toml to start from."),
+    ] = None,
+) -> None:
+    """List the shipped rigs, or copy one."""
+    from dcmp_hil.config import copy_rig, load_rig, shipped_rigs
+
+    if copy is not None:
+        for path in copy_rig(*copy):
+            console.out.print(f"wrote {path}", highlight=False)
+        return
+    for name in shipped_rigs():
+        rig = load_rig(name)
+        console.out.print(
+            f"[bold]{name:12}[/bold] {rig.loop.rate_hz:g} Hz, encoder {rig.encoder.counts_per_rev}, "
+            f"observer {rig.observer.kind}, backend {rig.backend.kind}",
+            highlight=False,
+        )

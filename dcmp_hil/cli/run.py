@@ -1,0 +1,59 @@
+"""`dcmp-hil run`: run a rig, show it, keep it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dcmp_hil.cli.options import JsonFile, Overrides, RigName
+
+
+class Viewer(StrEnum):
+    """What shows the run."""
+
+    SPAWN = "spawn"
+    CONNECT = "connect"
+    NONE = "none"
+
+
+def run(
+    rig: RigName = "bench-1khz",
+    overrides: Overrides = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", metavar="S", help="Length, s; 0 = until Ctrl-C.")
+    ] = None,
+    window_from: Annotated[
+        float, typer.Option("--from", metavar="S", help="The figures count from this time on, s.")
+    ] = 0.0,
+    fast: Annotated[bool, typer.Option("--fast", help="Virtual time: as fast as it computes (simulated rig).")] = False,
+    viewer: Annotated[
+        Viewer | None,
+        typer.Option(help="Start a viewer, connect to a running one, or none. Default: start one if there is a display."),
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Where the recording goes, instead of the run's folder.")
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no folder under runs/.")] = False,
+    json_file: JsonFile = None,
+    note: Annotated[str, typer.Option(metavar="TEXT", help="Kept with the run's figures.")] = "",
+) -> None:
+    """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
+
+    Ctrl-C ends it at 0 V and keeps what was recorded.
+    """
+    from dcmp_hil.cli.running import Options, execute
+
+    options = Options(
+        duration=duration,
+        window_from=window_from,
+        fast=fast,
+        viewer=viewer.value if viewer else None,
+        record=record,
+        keep=not no_record,
+        json_file=json_file,
+        note=note,
+    )
+    raise typer.Exit(execute(rig, overrides or (), options))

@@ -1,0 +1,118 @@
+"""One `dcmp-hil run` from options to exit code."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from dcmp_hil import __version__
+from dcmp_hil.cli import console
+from dcmp_hil.cli.run_folder import RunFolder
+from dcmp_hil.cli.status import StatusLine
+from dcmp_hil.cli.summary import summary_table
+from dcmp_hil.config import Rig, load_rig
+from dcmp_hil.config.explain import warnings
+from dcmp_hil.errors import TripError
+from dcmp_hil.session import Session
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dcmp_hil.telemetry.recorder import Sink
+
+_PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line asked for; None where it said nothing."""
+
+    duration: float | None
+    window_from: float
+    fast: bool
+    viewer: Literal["spawn", "connect", "none"] | None
+    record: Path | None
+    keep: bool
+    json_file: str | None
+    note: str
+
+
+def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
+    """Run, show, keep; return the exit code."""
+    rig = load_rig(rig_name, overrides)
+    for sentence in warnings(rig):
+        console.warn(sentence)
+    folder = RunFolder(rig.name) if options.keep else None
+    sinks = _sinks(rig, options, folder)
+    length = rig.run.duration_s if options.duration is None else options.duration
+    picture = folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options)
+    session = Session(
+        rig,
+        duration=options.duration,
+        fast=options.fast,
+        window_from=options.window_from,
+        sinks=sinks,
+        keep_columns=picture,
+    )
+    try:
+        session.run()
+    except TripError as trip:
+        _conclude(session, options, folder, trip)
+        raise
+    _conclude(session, options, folder, None)
+    asked = session.stop.signal
+    return 0 if asked in (None, signal.SIGINT) else 128 + cast("signal.Signals", asked)
+
+
+def _sinks(rig: Rig, options: Options, folder: RunFolder | None) -> list[Sink]:
+    """Everybody who looks on: the status line, and Rerun if there is a viewer or a recording."""
+    sinks: list[Sink] = [StatusLine(console.err, rig.period)]
+    record = options.record or (folder.recording if folder else None)
+    viewer = _viewer(options)
+    if record is not None or viewer != "none":
+        from dcmp_hil.telemetry.rerun_sink import RerunSink
+        from dcmp_hil.telemetry.rig_view import view_of
+
+        sink = RerunSink(rig=view_of(rig), record=record, viewer=viewer)
+        for sentence in sink.warnings:
+            console.warn(sentence)
+        sinks.append(sink)
+    return sinks
+
+
+def _viewer(options: Options) -> Literal["spawn", "connect", "none"]:
+    if options.viewer is not None:
+        return options.viewer
+    from dcmp_hil.telemetry.display import display_available
+
+    if display_available():
+        return "spawn"
+    return "none"
+
+
+def _wants_picture(options: Options) -> bool:
+    """Where nobody sees the run live, a picture of it stays behind."""
+    return _viewer(options) == "none"
+
+
+def _conclude(session: Session, options: Options, folder: RunFolder | None, trip: TripError | None) -> None:
+    """Print and keep the figures, however the run ended."""
+    result = session.result()
+    asked = session.stop.signal
+    document: dict[str, Any] = {
+        **asdict(result.summary),
+        "rig": session.rig.name,
+        "note": options.note,
+        "version": __version__,
+        "ended_by": trip.reason if trip else asked.name if asked else "duration",
+        "dropped_periods": result.dropped,
+    }
+    if options.json_file != "-":
+        console.out.print(summary_table(session.rig, result, document["ended_by"]))
+    if folder is not None:
+        folder.write(session.rig, document, result, trip)
+        folder.tell(options.record, live=_viewer(options) != "none")
+    if options.json_file is not None:
+        console.write_json(options.json_file, document)

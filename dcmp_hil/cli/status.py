@@ -1,0 +1,69 @@
+"""The live status line of a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.live import Live
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.values import Event
+
+_STYLES = {"WARN": "yellow", "ERROR": "bold red"}
+
+
+class StatusLine:
+    """A sink that shows the newest period on one line, and events above it.
+
+    Parameters
+    ----------
+    console
+        Where to; nothing live is drawn unless it is a terminal, events are printed anyway.
+    period
+        s, nominal, to tell which samples are late.
+    """
+
+    def __init__(self, console: Console, period: float) -> None:
+        self._console = console
+        self._period = period
+        self._phase = ""
+        self._late = 0
+        self._live: Live | None = None
+
+    def block(self, block: Block) -> None:
+        """Show the last of these periods."""
+        self._late += int((block["lateness"] > 0.5 * self._period).sum())
+        if not self._console.is_terminal:
+            return
+        if self._live is None:
+            self._live = Live(console=self._console, auto_refresh=False, transient=True)
+            self._live.start()
+        self._live.update(self._line(block), refresh=True)
+
+    def event(self, event: Event) -> None:
+        """Print warnings and errors; remember the phase."""
+        if event.level == "PHASE":
+            self._phase = event.text
+        elif event.level in _STYLES:
+            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_STYLES[event.level]))
+
+    def close(self) -> None:
+        """Take the line away; the summary follows."""
+        if self._live is not None:
+            self._live.stop()
+
+    def _line(self, block: Block) -> Text:
+        parts = (
+            f"{block['t'][-1]:8.2f} s",
+            f"{self._phase:8}",
+            f"position {block['position'][-1]:+7.3f} rad",
+            f"error {1e3 * block.tracking_error[-1]:+7.2f} mrad",
+            f"voltage {block['voltage_sent'][-1]:+6.2f} V",
+            f"w {block['disturbance_estimate'][-1]:+7.2f} rad/s²",
+            f"late {self._late}",
+        )
+        return Text("  ".join(parts), no_wrap=True, overflow="crop")

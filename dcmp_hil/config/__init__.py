@@ -1,0 +1,5 @@
+"""rig.toml: read, checked, explained."""
+
+from dcmp_hil.config.rig import Rig
+
+__all__ = ["Rig"]

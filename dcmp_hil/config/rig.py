@@ -1,0 +1,159 @@
+"""A whole rig.toml: its tables, and the rules that span more than one of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from dcmp_hil.config.sections import (
+    AmplifierSection,
+    BackendSection,
+    Custom,
+    EncoderSection,
+    LoopSection,
+    ModelSection,
+    RunSection,
+    SimSection,
+    SupervisorSection,
+)
+from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.model import Model
+from dcmp_hil.observers.paper import PaperSettings
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor
+from dcmp_hil.references.periodic import Chirp, Sine
+from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
+from dcmp_hil.references.table import Table
+from dcmp_hil.section import Section
+
+_COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there
+
+
+def _kind_or_custom(default: str) -> Discriminator:
+    def kind(value: Any) -> str:
+        got = value.get("kind", default) if isinstance(value, dict) else getattr(value, "kind", default)
+        return "custom" if ":" in str(got) else str(got)
+
+    return Discriminator(kind)
+
+
+ObserverSection = Annotated[
+    Annotated[SuperTwistingSettings, Tag("super_twisting")]
+    | Annotated[PaperSettings, Tag("paper")]
+    | Annotated[Custom, Tag("custom")],
+    _kind_or_custom("super_twisting"),
+]
+ControllerSection = Annotated[
+    Annotated[PdSettings, Tag("pd_compensated")]
+    | Annotated[PdSettings, Tag("pd")]
+    | Annotated[Custom, Tag("custom")],
+    _kind_or_custom("pd_compensated"),
+]
+ReferenceSection = Annotated[
+    Annotated[Sine, Tag("sine")]
+    | Annotated[Chirp, Tag("chirp")]
+    | Annotated[Hold, Tag("hold")]
+    | Annotated[Step, Tag("step")]
+    | Annotated[Trapezoid, Tag("trapezoid")]
+    | Annotated[Table, Tag("csv")],
+    _kind_or_custom("sine"),
+]
+
+
+class Rig(Section):
+    """Everything about one rig and one way of running it."""
+
+    name: str = Field(default="rig", min_length=1, max_length=60, pattern=r"^[\w.-]+$")
+    """What the run's folder and the dashboard call it."""
+    loop: LoopSection = LoopSection()
+    backend: BackendSection = BackendSection()
+    encoder: EncoderSection = EncoderSection()
+    amplifier: AmplifierSection = AmplifierSection()
+    model: ModelSection = ModelSection()
+    observer: ObserverSection = SuperTwistingSettings()
+    controller: ControllerSection = PdSettings()
+    reference: ReferenceSection = Sine()
+    supervisor: SupervisorSection = SupervisorSection()
+    run: RunSection = RunSection()
+    sim: SimSection = SimSection()
+
+    @property
+    def period(self) -> float:
+        """Nominal period, s."""
+        return 1.0 / self.loop.rate_hz
+
+    @property
+    def delay(self) -> float:
+        """From a sample to the instant at which its command acts, s."""
+        return self.loop.delay_samples * self.period
+
+    @property
+    def plant(self) -> Model:
+        """The simulated plant: `[model]` where `[sim.plant]` says nothing else."""
+        changed = self.sim.plant.model_dump(exclude_unset=True)
+        return self.model.model_copy(update=changed).values()
+
+    @property
+    def plant_steps(self) -> int:
+        """Steps of the simulated plant in a period."""
+        if self.sim.step_us == "auto":
+            return math.ceil(self.period / _COARSEST_STEP - 1e-9)
+        return max(1, round(self.period / (self.sim.step_us * 1e-6)))
+
+    @model_validator(mode="after")
+    def _check_rules(self) -> Rig:
+        faults = [fault for rule in _RULES if (fault := rule(self))]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+def _step_divides_period(rig: Rig) -> str:
+    if rig.sim.step_us == "auto":
+        return ""
+    steps = rig.period / (rig.sim.step_us * 1e-6)
+    if steps >= 1 - 1e-9 and abs(steps - round(steps)) < 1e-6 * steps:
+        return ""
+    fits = rig.period * 1e6 / max(1, math.ceil(steps - 1e-9))
+    return (
+        f"sim.step_us: got {rig.sim.step_us:g} us, which does not divide the period of {rig.period * 1e6:g} us "
+        f'(loop.rate_hz = {rig.loop.rate_hz:g}). {fits:g} us would, or write "auto".'
+    )
+
+
+def _floor_below_rate(rig: Rig) -> str:
+    mu0 = getattr(rig.observer, "mu0_rad_s", None)
+    if mu0 is None or mu0 * rig.period <= 0.3 + 1e-9:
+        return ""
+    usual = bandwidth_floor(rig.encoder.counts, rig.period)
+    return (
+        f"observer.mu0_rad_s: got {mu0:g} rad/s, too fast for loop.rate_hz = {rig.loop.rate_hz:g}: at most "
+        f"{0.3 / rig.period:g} rad/s. Leave the key out to get {usual:.3g} rad/s, or raise the rate."
+    )
+
+
+def _simulation_only(rig: Rig) -> str:
+    """What no amplifier or encoder of iron may be run with."""
+    if rig.backend.kind == "sim" or ":" in rig.backend.kind:
+        return ""
+    loose = [
+        name
+        for name, found in (
+            ('encoder.counts_per_rev = "ideal"', rig.encoder.counts is None),
+            ('amplifier.voltage_limit_V = "none"', math.isinf(rig.amplifier.limit)),
+            ("loop.delay_samples = 0", rig.loop.delay_samples == 0),
+            ('supervisor.monitors = "finite"', rig.supervisor.monitors == "finite"),
+            ('supervisor.start = "immediate"', rig.supervisor.start == "immediate"),
+        )
+        if found
+    ]
+    if not loose:
+        return ""
+    return (
+        f'backend.kind: got "{rig.backend.kind}", but {", ".join(loose)} is for simulation only. '
+        'Set backend.kind = "sim", or start from the rig bench-1khz.'
+    )
+
+
+_RULES = (_step_divides_period, _floor_below_rate, _simulation_only)

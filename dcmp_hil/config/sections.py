@@ -1,0 +1,145 @@
+"""The tables of rig.toml: every key with its unit, its bounds and what it means."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from dcmp_hil.model import Model
+from dcmp_hil.section import NotNegative, Positive, Section
+
+
+class LoopSection(Section):
+    """`[loop]`: how often, and how late a command acts."""
+
+    rate_hz: float = Field(default=1000.0, ge=10.0, le=20_000.0)
+    """Samples a second, Hz."""
+    delay_samples: Literal[0, 1] = 1
+    """Periods from a sample to the instant at which its command acts: 1 on every real device."""
+
+
+class BackendSection(Section):
+    """`[backend]`: the way to the device."""
+
+    kind: str = "sim"
+    """`sim`, or `module:Factory` of your own."""
+
+
+class EncoderSection(Section):
+    """`[encoder]`: what one count means."""
+
+    counts_per_rev: Annotated[float, Field(ge=16, le=2**24)] | Literal["ideal"] = 4096
+    """Counts a revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
+
+    @property
+    def counts(self) -> float | None:
+        """Counts a revolution; None for an ideal encoder."""
+        return None if self.counts_per_rev == "ideal" else float(self.counts_per_rev)
+
+
+class AmplifierSection(Section):
+    """`[amplifier]`: what the amplifier may put out."""
+
+    voltage_limit_V: Annotated[float, Field(gt=0, le=100)] | Literal["none"] = 10.0
+    """Largest voltage either way, V; "none" in simulation only."""
+    slew_V_s: Annotated[float, Field(gt=0)] | Literal["none"] = "none"
+    """Largest change, V/s; "none" for no limit."""
+
+    @property
+    def limit(self) -> float:
+        """Largest voltage, V; infinity for none."""
+        return math.inf if self.voltage_limit_V == "none" else float(self.voltage_limit_V)
+
+    @property
+    def slew(self) -> float:
+        """Largest change, V/s; infinity for none."""
+        return math.inf if self.slew_V_s == "none" else float(self.slew_V_s)
+
+
+class ModelSection(Section):
+    """`[model]`: the pendulum as observer and controller believe it, eqs. (1)-(4), (12), (13)."""
+
+    f0_1_s: Annotated[float, Field(ge=0, le=100)] = 0.1
+    """Viscous friction over inertia fd/J, 1/s."""
+    f1_rad_s2: Annotated[float, Field(ge=0, le=1000)] = 1.3
+    """Coulomb friction over inertia fc/J, rad/s2."""
+    gravity_rad_s2: Annotated[float, Field(ge=0, le=1000)] = 14.03
+    """Gravity over inertia gmL/J, rad/s2."""
+    ku_rad_s2_V: Annotated[float, Field(gt=0, le=10_000)] = 5.4
+    """Motor and amplifier gain over inertia ku/J, (rad/s2)/V."""
+    eta_rad_s2: float = 0.84
+    """External disturbance eta/J, constant part, rad/s2."""
+    eta_amplitude_rad_s2: float = 0.2
+    """External disturbance, swinging part, rad/s2."""
+    eta_rate_rad_s: NotNegative = 0.2
+    """Angular frequency of the swinging part, rad/s."""
+
+    def values(self) -> Model:
+        """Return the numbers without pydantic, for the loop."""
+        return Model(
+            f0=self.f0_1_s,
+            f1=self.f1_rad_s2,
+            gravity=self.gravity_rad_s2,
+            ku=self.ku_rad_s2_V,
+            eta=self.eta_rad_s2,
+            eta_amplitude=self.eta_amplitude_rad_s2,
+            eta_rate=self.eta_rate_rad_s,
+        )
+
+
+class SimSection(Section):
+    """`[sim]`: the simulated rig, where it differs from the believed one."""
+
+    step_us: Annotated[float, Field(gt=0, le=10_000)] | Literal["auto"] = "auto"
+    """Plant step, us; must divide the period. "auto": the largest divisor not above 200 us."""
+    integrator: Literal["moreau", "euler"] = "moreau"
+    """`moreau`: friction that can stick; `euler`: the paper's naive one."""
+    position_rad: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    """Where the arm is at the start, at rest, rad; 0 = hanging."""
+    encoder_phase_counts: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """Where between two edges the encoder's zero lies, counts."""
+    encoder_noise_counts: NotNegative = 0.0
+    """Noise before the quantiser, standard deviation, counts (rad with an ideal encoder)."""
+    dead_zone_V: NotNegative = 0.0
+    """The amplifier puts out nothing below this, V."""
+    voltage_step_mV: NotNegative = 0.0
+    """Step of the amplifier's output, mV; 0 for none."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Seed of all noise: the same seed gives the same run to the bit."""
+    plant: ModelSection = ModelSection()
+    """`[sim.plant]`: keys of [model] that the simulated plant has otherwise; the rest is as in [model]."""
+
+
+class SupervisorSection(Section):
+    """`[supervisor]`: how a run starts, and what stops it."""
+
+    start: Literal["engage", "immediate"] = "engage"
+    """`engage`: let the observer settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
+    monitors: Literal["all", "finite"] = "all"
+    """`finite`: watch for NaN and device faults only (simulation only)."""
+    velocity_limit_rad_s: Positive = 20.0
+    """Trip above this estimated velocity, rad/s."""
+    position_limit_rad: Positive = 6.2832
+    """Trip beyond this position either way, rad."""
+    disturbance_limit_rad_s2: Positive = 50.0
+    """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
+
+
+class RunSection(Section):
+    """`[run]`: when and how a run ends."""
+
+    duration_s: Annotated[float, Field(ge=0, le=1e6)] = 30.0
+    """Length, s; 0 = until Ctrl-C."""
+    end: Literal["release", "lower"] = "release"
+    """After the duration: 0 V at once, or first a 2 s move to hanging."""
+
+
+class Custom(Section):
+    """An observer or a controller of your own: `kind = "module:Class"`, made as Class(setting, **options)."""
+
+    kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
+    """`module:Class`; the module must be importable from where the run is started."""
+    options: dict[str, Any] = {}
+    """Handed to the class as keyword arguments."""

@@ -1,0 +1,112 @@
+"""The zero-phase reference: what velocity and disturbance really were, as far as a position can tell."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_ORDER = 3
+
+
+class ZeroPhase(NamedTuple):
+    """The reference at the rows of a recording; NaN in a stretch too short to filter.
+
+    Parameters
+    ----------
+    velocity
+        rad/s, shape (n,).
+    disturbance
+        rad/s2, shape (n,): x'' + f0 x' - u by eq. (2), all three filtered alike.
+    """
+
+    velocity: NDArray[np.float64]
+    disturbance: NDArray[np.float64]
+
+
+def zero_phase(
+    time: NDArray[np.float64],
+    position: NDArray[np.float64],
+    applied: NDArray[np.float64],
+    *,
+    period: float,
+    f0: float,
+    longest_gap: float,
+    cutoff: float = 15.0,
+) -> ZeroPhase:
+    """Filter forwards and backwards, then take central differences.
+
+    The filter (third-order Butterworth) needs even sampling: the rows are interpolated linearly onto an even
+    grid of nearly one period, filtered and differentiated there, and read back at their own instants. That
+    bridges lost samples. A gap longer than `longest_gap` is not bridged: what lies before and after it is
+    filtered on its own.
+
+    The ends are continued by odd reflection over half a period of the corner (scipy's own 12 samples are too
+    few at high rates), and still are the least certain part.
+
+    Parameters
+    ----------
+    time, position
+        s and rad, shape (n,).
+    applied
+        rad/s2, shape (n,): u over the step that ends at each row.
+    period
+        s, the usual step.
+    f0
+        1/s, viscous friction.
+    longest_gap
+        s.
+    cutoff
+        Hz, of the Butterworth filter.
+
+    Raises
+    ------
+    ConfigError
+        If scipy is missing, or the sampling is too slow for the corner.
+    """
+    if cutoff * period >= 0.5:
+        raise ConfigError(
+            f"A usual step of {period:g} s ({1.0 / period:.4g} Hz) is too slow for a reference of {cutoff:g} Hz, "
+            f"which needs more than {2.0 * cutoff:g} Hz. Check --time-unit, or lower the corner by --cutoff."
+        )
+    velocity, disturbance = np.full(len(time), np.nan), np.full(len(time), np.nan)
+    breaks = np.flatnonzero(np.diff(time) > longest_gap) + 1
+    for first, last in pairwise([0, *breaks.tolist(), len(time)]):
+        rows = slice(first, last)
+        # Around a row, u is the mean of the steps on either side of it.
+        around = 0.5 * (applied[rows] + np.append(applied[first + 1 : last], applied[last - 1]))
+        grid = _even(time[rows], period)
+        pad = max(4 * _ORDER, round(0.5 / (cutoff * period)))
+        if len(grid) <= pad:
+            continue
+        smooth, u = (
+            _both_ways(np.interp(grid, time[rows], values), cutoff * (grid[1] - grid[0]), pad)
+            for values in (position[rows], around)
+        )
+        v = np.gradient(smooth, grid)
+        velocity[rows] = np.interp(time[rows], grid, v)
+        disturbance[rows] = np.interp(time[rows], grid, np.gradient(v, grid) + f0 * v - u)
+    return ZeroPhase(velocity, disturbance)
+
+
+def _even(time: NDArray[np.float64], period: float) -> NDArray[np.float64]:
+    """Lay an even grid whose first and last points are the first and last rows."""
+    return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
+
+
+def _both_ways(values: NDArray[np.float64], corner: float, pad: int) -> NDArray[np.float64]:
+    """Run the filter forwards and backwards; `corner` is in cycles a point."""
+    try:
+        from scipy.signal import butter, sosfiltfilt
+    except ImportError:
+        raise ConfigError(
+            "The zero-phase reference needs scipy. Install it: pip install 'dcmp-hil[plot]'"
+        ) from None
+    sections = butter(_ORDER, corner, fs=1.0, output="sos")
+    return np.asarray(sosfiltfilt(sections, values, padlen=pad), dtype=np.float64)

@@ -1,0 +1,49 @@
+"""The encoder's resolution, told from a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SMALLEST = 1e-9  # rad: below it lies the rounding of arithmetic, not an encoder
+_TRIES = 50
+_MULTIPLES = 20  # counts: in longer steps a small error of the candidate hides every fraction
+_FEWEST = 10  # steps to judge a candidate by
+_FITTING = 0.95  # of the steps; a few may be glitches
+_MISFIT = 0.15  # counts; 30 % of random steps would pass
+
+_TURN = 2.0 * np.pi
+
+
+def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
+    """Estimate the counts a revolution from the smallest step of the position.
+
+    A step counts as the encoder's if nearly all the steps of up to twenty counts are whole multiples of it:
+    one odd row does not pass for a finer encoder. The estimate is then the median of step / multiple, so that
+    the digits that the file was rounded to do not matter.
+
+    Parameters
+    ----------
+    position
+        rad, shape (n,).
+
+    Returns
+    -------
+    float or None
+        Counts a revolution; None where no such step exists (a filtered position, an ideal encoder, an arm
+        that hardly moved).
+    """
+    steps = np.sort(np.abs(np.diff(position)))
+    steps = steps[steps > _SMALLEST]
+    candidate = 0.0
+    for _ in range(_TRIES):
+        larger = steps[np.searchsorted(steps, 1.02 * candidate) :]
+        if len(larger) < _FEWEST:
+            return None
+        candidate = float(larger[0])
+        short = steps[(steps > 0.5 * candidate) & (steps < (_MULTIPLES + 0.5) * candidate)]
+        multiples = np.round(short / candidate)
+        fits = np.abs(short / candidate - multiples) < _MISFIT
+        if len(short) >= _FEWEST and np.mean(fits) >= _FITTING:
+            return float(_TURN / np.median(short[fits] / multiples[fits]))
+    return None

@@ -1,0 +1,99 @@
+"""What a replay may be told: the observer's parameters, the inertia, and how the figures are judged."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from dcmp_hil.errors import ConfigError
+
+InputKind = Literal["torque", "voltage"]
+IDEAL = "ideal"
+"""`counts_per_rev` of an encoder without steps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySettings:
+    """Options of a replay; None takes the default that its line names.
+
+    Raises
+    ------
+    ConfigError
+        If a value is out of range; names every one that is.
+    """
+
+    observer: str = "super_twisting"
+    """`super_twisting` (R1), `paper` (R0), or `module:Class` of your own, made as Class(Setting)."""
+    f0: float = 0.1
+    """Viscous friction over inertia fd/J, 1/s."""
+    inertia: float | None = None
+    """J, kg m2: turns a torque into the input u = torque / J. Required with a torque."""
+    ku: float = 5.4
+    """ku/J, (rad/s2)/V: turns a voltage into the input u = ku V. Unused with a torque."""
+    input_at: Literal["start", "end"] = "start"
+    """Which row holds the input over [k-1, k): `start` is row k-1, `end` is row k."""
+    counts_per_rev: float | Literal["ideal"] | None = None
+    """Encoder counts a revolution, for the rule of mu0; None estimates it from the recording."""
+    period: float | None = None
+    """Nominal sampling period T, s; None takes the median step."""
+    L1: float = 4.9
+    """Copy gain, 1/s."""
+    L2: float = 5.51
+    """Copy gain, 1/s2."""
+    M: float | None = None
+    """Differentiator gain, rad/s3; None: 15 (1000 for an ideal encoder) in super_twisting, 1000 in paper."""
+    mu0: float | None = None
+    """Bandwidth floor of super_twisting, rad/s; None goes by the rule of `bandwidth_floor`."""
+    start: float = 0.3
+    """The figures count what is later than this after the first row and after every restart, s."""
+    cutoff: float = 15.0
+    """Corner of the zero-phase reference, Hz."""
+
+    def __post_init__(self) -> None:
+        """Check every number against its range."""
+        faults = [
+            f"{option}: got {value:g}{unit}, expected {_range(least, most, open_)}. {remedy}"
+            for option, value, unit, least, most, open_, remedy in self._ranges()
+            if not (least < value <= most if open_ else least <= value <= most)
+        ]
+        if self.input_at not in ("start", "end"):
+            faults.append(f'--input-at: got "{self.input_at}". Write start (the value in row k-1) or end (row k).')
+        if self.mu0 is not None and self.observer == "paper":
+            faults.append("--mu0: the paper's observer has no bandwidth floor. Leave it out, or use super_twisting.")
+        if faults:
+            raise ConfigError(*faults)
+
+    def _ranges(self) -> list[tuple[str, float, str, float, float, bool, str]]:
+        """Option, value, unit, least, most, whether the least itself is out, remedy; of those that are set."""
+        counts = None if self.counts_per_rev == IDEAL else self.counts_per_rev
+        most_M = "Leave it out for the default."
+        rows: list[tuple[str, float | str | None, str, float, float, bool, str]] = [
+            ("--f0", self.f0, " 1/s", 0.0, 1e3, False, "It is the viscous friction over the inertia."),
+            ("--inertia", self.inertia, " kg m2", 0.0, 1e6, True, "Give J in kg m2."),
+            ("--ku", self.ku, " (rad/s2)/V", 0.0, 1e6, True, "It is ku/J, the acceleration of one volt."),
+            ("--counts-per-rev", counts, "", 4.0, 1e9, False, "Give the counts after quadrature, or ideal."),
+            ("--period", self.period, " s", 1e-6, 10.0, False, "Leave it out to take the median step."),
+            ("--L1", self.L1, " 1/s", 0.0, 1e4, True, "The paper's is 4.9."),
+            ("--L2", self.L2, " 1/s2", 0.0, 1e4, True, "The paper's is 5.51."),
+            ("--M", self.M, " rad/s3", 0.0, 1e9, self.observer == "paper", most_M),
+            ("--mu0", self.mu0, " rad/s", 0.0, 1e6, False, "Leave it out to go by the rule."),
+            ("--from", self.start, " s", 0.0, 1e9, False, "Write the seconds to leave out at the start."),
+            ("--cutoff", self.cutoff, " Hz", 0.0, 1e5, True, "The usual one is 15 Hz."),
+        ]
+        return [
+            (option, _number(value), unit, least, most, open_, remedy)
+            for option, value, unit, least, most, open_, remedy in rows
+            if value is not None
+        ]
+
+
+def _number(value: float | str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        return math.nan  # in no range, so that it is named like any other fault
+
+
+def _range(least: float, most: float, open_: bool) -> str:
+    return f"a number {'above' if open_ else 'of at least'} {least:g} and of at most {most:g}"
