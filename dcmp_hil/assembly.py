@@ -109,7 +109,7 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
     )
 
 
-def _make_custom(section: Custom, setting: object, key: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+def _make_custom(section: Custom, setting: object, key: str):  # type: ignore[no-untyped-def]
     make = find_named(section.kind, f"{key}.kind")
     try:
         return make(setting, **section.options)

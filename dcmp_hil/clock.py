@@ -41,8 +41,7 @@ class SimulatedClock:
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         """Jump to `deadline_ns`; never backwards."""
-        if deadline_ns > self._now_ns:
-            self._now_ns = deadline_ns
+        self._now_ns = max(self._now_ns, deadline_ns)
 
 
 def pause(seconds: float) -> None:

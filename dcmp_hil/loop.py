@@ -76,7 +76,12 @@ def run(line: Line, until: float, stop: Stop) -> float:
     backend, trajectory, supervisor, clock, delay = (
         line.backend, line.trajectory, line.supervisor, line.clock, line.delay,
     )  # fmt: skip
-    observer, predictor, controller, telemetry = line.observer, line.predictor, line.controller, line.telemetry
+    observer, predictor, controller, telemetry = (
+        line.observer,
+        line.predictor,
+        line.controller,
+        line.telemetry,
+    )
     previous, first = math.nan, math.nan
 
     while True:

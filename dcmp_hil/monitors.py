@@ -70,7 +70,8 @@ class Ranges:
         if not -self._position <= sample.position <= self._position:
             raise TripError(
                 "travel",
-                f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; the limit is {self._position:g} rad.",
+                f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; "
+                f"the limit is {self._position:g} rad.",
                 "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
             )
 
@@ -115,6 +116,6 @@ class DisturbanceWatch:
                 "disturbance",
                 f"Estimated disturbance {filtered:.0f} rad/s2 (10 ms mean) at t = {sample.t:.3f} s; "
                 f"the limit is {self._limit:g} rad/s2.",
-                "The arm does not answer the voltage as [model] says: check polarity, motor power, the encoder's "
-                "cable, and that the voltage fed back is the one really applied.",
+                "The arm does not answer the voltage as [model] says: check polarity, motor power, the "
+                "encoder's cable, and that the voltage fed back is the one really applied.",
             )

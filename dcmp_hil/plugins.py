@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil.errors import ConfigError
 
@@ -32,7 +32,9 @@ def find_named(path: str, key: str, known: Iterable[str] = ()) -> Callable[..., 
     module_name, colon, name = path.partition(":")
     if not colon:
         close = get_close_matches(path, list(known), n=1)
-        hint = f'Did you mean "{close[0]}"?' if close else f"Write one of {', '.join(known)}, or module:Class."
+        hint = (
+            f'Did you mean "{close[0]}"?' if close else f"Write one of {', '.join(known)}, or module:Class."
+        )
         raise ConfigError(f'{key}: got "{path}", which is unknown. {hint}')
     try:
         module = importlib.import_module(module_name)
@@ -47,4 +49,4 @@ def find_named(path: str, key: str, known: Iterable[str] = ()) -> Callable[..., 
         close = get_close_matches(name, names, n=1)
         hint = f" Did you mean {close[0]}?" if close else ""
         raise ConfigError(f'{key}: got "{path}", but {module_name} has no class {name}.{hint}')
-    return found
+    return cast("Callable[..., Any]", found)

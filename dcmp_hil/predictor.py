@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample
 
 
+_NO_FRICTION, _SERIES_BELOW = 1e-9, 1e-2  # of f0 T
+
+
 class Predictor:
     """Exact prediction of x'' = -f0 x' + w + (ku/J) V with w and V held over each period.
 
@@ -66,10 +69,12 @@ def held_input(f0: float, period: float) -> tuple[float, float, float]:
         (a, p1, p2): x1 += p1 x2 + p2 d; x2 = a x2 + p1 d.
     """
     a = math.exp(-f0 * period)
-    if f0 * period < 1e-9:
-        return a, period, 0.5 * period * period
-    p1 = -math.expm1(-f0 * period) / f0
-    # For small f0 T the closed form (T - p1)/f0 cancels; the series is exact to double precision.
     x = f0 * period
-    p2 = period * period * (0.5 - x / 6 + x * x / 24 - x**3 / 120) if x < 1e-2 else (period - p1) / f0
-    return a, p1, p2
+    if x < _NO_FRICTION:
+        return a, period, 0.5 * period * period
+    p1 = -math.expm1(-x) / f0
+    if x > _SERIES_BELOW:
+        return a, p1, (period - p1) / f0
+    # For small f0 T the closed form (T - p1)/f0 cancels; six terms are exact to double precision.
+    series = 1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))
+    return a, p1, period * period * series

@@ -182,12 +182,13 @@ def _check_times(rig: Rig, length: float, window_from: float, *, fast: bool) -> 
         raise ConfigError(f"duration: got {length}; expected seconds, 0 (until Ctrl-C) or more.")
     if not 0.0 <= window_from < (length or math.inf):
         raise ConfigError(
-            f"from: got {window_from} s, outside the run of {length:g} s. Choose an earlier start of the window, "
-            "or a longer duration."
+            f"from: got {window_from} s, outside the run of {length:g} s. "
+            "Choose an earlier start of the window, or a longer duration."
         )
     if fast and length == 0.0:
         raise ConfigError("duration: 0 (until Ctrl-C) and virtual time would never end. Give a duration.")
     if fast and rig.backend.kind != "sim" and ":" not in rig.backend.kind:
         raise ConfigError(
-            f'fast: backend.kind = "{rig.backend.kind}" runs in real time; virtual time needs backend.kind = "sim".'
+            f'fast: backend.kind = "{rig.backend.kind}" runs in real time; '
+            'virtual time needs backend.kind = "sim".'
         )

@@ -51,7 +51,7 @@ class Supervisor:
         self._checks = tuple(monitor.check for monitor in monitors)
         self._limit = voltage_limit
         self._settle, self._engage = settle, engage
-        self._since: float | None = None  # device time at which the present phase began
+        self._since = math.nan  # s, device time at which the present phase began
         self.phase = Phase.SETTLING
         self.trip: TripError | None = None
         self.clamped = 0  # periods in which the demand was more than the limit
@@ -62,7 +62,7 @@ class Supervisor:
         """Return True in the first period of ENGAGING, when the trajectory's clock starts."""
         if self.phase is not Phase.SETTLING:
             return False
-        if self._since is None:
+        if math.isnan(self._since):
             self._enter(Phase.SETTLING, sample.t)
         if sample.t - self._since < self._settle:
             return False
@@ -95,11 +95,13 @@ class Supervisor:
         self.clamped += 1
         if not t - self._clamp_said < 1.0:
             self._clamp_said = t
-            self._notify(Event(t, "WARN", f"voltage limited: {demand:.1f} V asked for, {limit:.1f} V allowed"))
+            self._notify(
+                Event(t, "WARN", f"voltage limited: {demand:.1f} V asked for, {limit:.1f} V allowed")
+            )
 
     def _growing_limit(self, t: float) -> float:
         """Return the authority of the first two phases, V; full authority ends the second."""
-        if self.phase is Phase.SETTLING or self._since is None:
+        if self.phase is Phase.SETTLING:
             return 0.0
         if t - self._since < self._engage:
             return self._limit * (t - self._since) / self._engage

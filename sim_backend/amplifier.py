@@ -45,13 +45,13 @@ class Amplifier:
         self._waiting = deque([0.0] * len(self._waiting))
 
     def step(self) -> float:
-        """Return the voltage applied over the next period, V; the newest command is held until another comes."""
+        """Return the voltage applied over the next period, V; the newest command is held."""
         if not self.live:
             return 0.0
         self._waiting.append(self._newest)
         wanted = self._waiting.popleft()
         limit = self._limit
-        wanted = limit if wanted > limit else -limit if wanted < -limit else wanted
+        wanted = limit if wanted > limit else max(wanted, -limit)
         self._output = wanted if self._plain else self._shaped(wanted)
         return self._output
 

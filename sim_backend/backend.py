@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
 
-_PLANTS = {"moreau": MoreauPlant, "euler": EulerPlant}
+_PLANTS: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
 _FORGIVEN = 10  # periods behind, after which the pace starts afresh instead of being caught up
 
 

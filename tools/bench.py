@@ -87,7 +87,7 @@ def _step_us(make: Callable[[], Observer]) -> float:
 
 def _command_s(*arguments: str) -> float:
     began = time.perf_counter()
-    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own
     return time.perf_counter() - began
 
 
@@ -95,9 +95,24 @@ def _rows() -> list[Row]:
     bench, coarse = load_rig("bench-1khz"), load_rig("bench-1khz", ["sim.step_us=500"])
     setting = Setting(bench.model.values(), bench.period, bench.encoder.counts)
     return [
-        _row("loop in virtual time, telemetry off, plant step 200 us", "x", ">= 100", lambda: _line_factor(bench, telemetry=False)),
-        _row("loop in virtual time, telemetry off, plant step 500 us", "x", ">= 100", lambda: _line_factor(coarse, telemetry=False)),
-        _row("loop in virtual time, ring and black box on, 200 us", "x", "", lambda: _line_factor(bench, telemetry=True)),
+        _row(
+            "loop in virtual time, telemetry off, plant step 200 us",
+            "x",
+            ">= 100",
+            lambda: _line_factor(bench, telemetry=False),
+        ),
+        _row(
+            "loop in virtual time, telemetry off, plant step 500 us",
+            "x",
+            ">= 100",
+            lambda: _line_factor(coarse, telemetry=False),
+        ),
+        _row(
+            "loop in virtual time, ring and black box on, 200 us",
+            "x",
+            "",
+            lambda: _line_factor(bench, telemetry=True),
+        ),
         _row("run(), figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
         _row("super_twisting (R1), one step", "us", "<= 2", lambda: _step_us(lambda: SuperTwisting(setting))),
         _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
@@ -131,7 +146,9 @@ def main() -> None:
     write(f"{'':56}{'median':>10}{'min':>10}{'max':>10}  unit  goal\n")
     for row in rows:
         write(f"{row.what:56}{row.median:10.3f}{row.low:10.3f}{row.high:10.3f}  {row.unit:4}  {row.goal}\n")
-    write("\nthe figures at these plant steps (theory: tracking < .28 mrad, v < .0075, w < .28, TV 60 to 80)\n")
+    write(
+        "\nthe figures at these plant steps (theory: tracking < .28 mrad, v < .0075, w < .28, TV 60 to 80)\n"
+    )
     for row_of_figures in figures:
         write("  ".join(f"{name} {value:.4g}" for name, value in row_of_figures.items()) + "\n")
     document = {"rows": [asdict(row) for row in rows], "figures": figures}

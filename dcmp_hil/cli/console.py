@@ -51,7 +51,9 @@ def write_json(target: str, figures: Any) -> None:
     try:
         Path(target).write_text(text + "\n", encoding="utf-8")
     except OSError as error:
-        raise ConfigError(f"--json {target}: {error.strerror or error}. Choose a file you may write.") from None
+        raise ConfigError(
+            f"--json {target}: {error.strerror or error}. Choose a file you may write."
+        ) from None
 
 
 def _plain(value: Any) -> Any:

@@ -14,5 +14,6 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key, such as loop.rate_hz=500. Repeatable."),
 ]
 JsonFile = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON; - for standard output.")
+    str | None,
+    typer.Option("--json", metavar="FILE", help="Write the figures as JSON; - for standard output."),
 ]

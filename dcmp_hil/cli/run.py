@@ -28,13 +28,18 @@ def run(
     window_from: Annotated[
         float, typer.Option("--from", metavar="S", help="The figures count from this time on, s.")
     ] = 0.0,
-    fast: Annotated[bool, typer.Option("--fast", help="Virtual time: as fast as it computes (simulated rig).")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Virtual time: as fast as it computes (simulated rig).")
+    ] = False,
     viewer: Annotated[
         Viewer | None,
-        typer.Option(help="Start a viewer, connect to a running one, or none. Default: start one if there is a display."),
+        typer.Option(
+            help="Start a viewer, connect to a running one, or none. By default: one if there is a display"
+        ),
     ] = None,
     record: Annotated[
-        Path | None, typer.Option(metavar="FILE.rrd", help="Where the recording goes, instead of the run's folder.")
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Where the recording goes, instead of the run's folder."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no folder under runs/.")] = False,
     json_file: JsonFile = None,

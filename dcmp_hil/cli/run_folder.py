@@ -42,7 +42,8 @@ class RunFolder:
                 continue
             except OSError as error:
                 raise ConfigError(
-                    f"{self.path}: {error.strerror or error}. Start from a folder you may write in, or use --no-record."
+                    f"{self.path}: {error.strerror or error}. "
+                    "Start from a folder you may write in, or use --no-record."
                 ) from None
             return
         raise ConfigError(f"{_RUNS / stem}: 99 runs began in this second. Wait a moment.")
@@ -55,7 +56,9 @@ class RunFolder:
     def write(self, rig: Rig, document: dict[str, Any], result: Result, trip: TripError | None) -> None:
         """Write everything but the recording; a full disk costs a warning, not the figures on the screen."""
         try:
-            console.write_json(str(self.path / "summary.json"), {**document, "rig_toml": rig.model_dump(mode="json")})
+            console.write_json(
+                str(self.path / "summary.json"), {**document, "rig_toml": rig.model_dump(mode="json")}
+            )
             if trip is not None:
                 self._write_black_box(trip)
             if result.columns:

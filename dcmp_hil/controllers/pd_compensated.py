@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from dcmp_hil.controllers import Setting
 from dcmp_hil.section import NotNegative, Section
-from dcmp_hil.values import Estimate, Reference
+
+if TYPE_CHECKING:
+    from dcmp_hil.controllers import Setting
+    from dcmp_hil.values import Estimate, Reference
 
 
 class PdSettings(Section):

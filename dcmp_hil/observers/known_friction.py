@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.values import Estimate, Sample
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.observers import Observer, Setting
-    from dcmp_hil.values import Reference
+    from dcmp_hil.values import Estimate, Reference, Sample
 
 _CROSSING_RAD_S = 0.005  # the sign is a ramp inside it, so that the voltage stays continuous
 
@@ -18,8 +16,8 @@ _CROSSING_RAD_S = 0.005  # the sign is a ramp inside it, so that the voltage sta
 class KnownFriction:
     """Any observer, relieved of the jump of 2 f1 at every reversal (`controller.friction_feedforward`).
 
-    The observer is told of friction as of an input that is known, -f1 sat(x_r' / 0.005 rad/s), and so has only
-    the rest of w to find; what is reported, and compensated, is the whole w.
+    The observer is told of friction as of an input that is known, -f1 sat(x_r' / 0.005 rad/s), and so has
+    only the rest of w to find; what is reported, and compensated, is the whole w.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def matched_gains(x: float) -> Gains:
         mu T, bandwidth times step; capped at 50, where the gains have reached (1, 1.5, 1).
         NaN gives NaN.
     """
-    x = _X_MAX if x > _X_MAX else x
+    x = min(x, _X_MAX)
     d = -math.expm1(-_R * x)
     m = math.exp(-2.0 * _A * x)
     q = math.exp(-_A * x) * math.cos(_C * x)
@@ -81,9 +81,9 @@ def luenberger_copy(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
     return Copy(*e[0, :2].tolist(), *e[1, :2].tolist(), *e[:2, 2].tolist(), *h0.tolist(), *h1.tolist())
 
 
-def _expm(matrix: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> np.ndarray[
-    tuple[int, int], np.dtype[np.float64]
-]:
+def _expm(
+    matrix: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Matrix exponential by scaling, Taylor series and squaring; scipy is no dependency of the loop."""
     squarings = max(0, math.ceil(math.log2(max(float(np.abs(matrix).sum(axis=1).max()), 1e-300))) + 1)
     scaled = matrix / 2.0**squarings

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.observers import Setting
 from dcmp_hil.section import Positive, Section
 from dcmp_hil.values import Estimate, Sample
+
+if TYPE_CHECKING:
+    from dcmp_hil.observers import Setting
 
 _LAMBDA1, _LAMBDA2, _LAMBDA3 = 2.0, 1.5, 1.1
 

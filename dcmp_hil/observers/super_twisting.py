@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.observers import Setting
 from dcmp_hil.observers.matched import Copy, Gains, luenberger_copy, matched_gains
 from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
+
+if TYPE_CHECKING:
+    from dcmp_hil.observers import Setting
 
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
 _SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that
@@ -29,7 +31,7 @@ class SuperTwistingSettings(Section):
     M_rad_s3: NotNegative | None = None
     """Bound on the slope of w, rad/s3; by default 15, and 1000 for an ideal encoder. 0 = linear."""
     mu0_rad_s: NotNegative | None = Field(default=None)
-    """Bandwidth floor, rad/s: the quiet/fast knob; by default from encoder and rate. 0 = pure sliding mode."""
+    """Bandwidth floor, rad/s: the quiet/fast knob; by default from encoder and rate. 0 = no floor."""
 
     def build(self, setting: Setting) -> SuperTwisting:
         """Make the observer for a rig."""
@@ -49,7 +51,8 @@ def bandwidth_floor(counts_per_rev: float | None, period: float) -> float:
     largest = 0.3 / period
     if counts_per_rev is None:
         return largest
-    return min(40.0 * (counts_per_rev / 4096.0) ** (1 / 3) * (1e-3 / period) ** (1 / 6), largest)
+    usual: float = 40.0 * (counts_per_rev / 4096.0) ** (1 / 3) * (1e-3 / period) ** (1 / 6)
+    return min(usual, largest)
 
 
 def slope_bound(counts_per_rev: float | None) -> float:
@@ -83,7 +86,13 @@ class SuperTwisting:
     """
 
     def __init__(
-        self, setting: Setting, *, L1: float = 4.9, L2: float = 5.51, M: float | None = None, mu0: float | None = None
+        self,
+        setting: Setting,
+        *,
+        L1: float = 4.9,
+        L2: float = 5.51,
+        M: float | None = None,
+        mu0: float | None = None,
     ) -> None:
         counts, period = setting.counts_per_rev, setting.period
         self.M = slope_bound(counts) if M is None else M
@@ -127,9 +136,7 @@ class SuperTwisting:
         self._v2 = v2 = v2 + k2 * b
         self._v3 = v3 = v3 + k3 * b
         self._t, self._y = t, y
-        return Estimate(
-            self._z1 + v1, self._z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1
-        )
+        return Estimate(self._z1 + v1, self._z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1)
 
     def _restart(self, t: float, y: float) -> Estimate:
         """Begin at rest where the arm is: never at 0, which would be a step of the whole position."""

@@ -55,7 +55,10 @@ class Trapezoid(ReferenceSettings):
         """Return the reference `t` seconds after the start."""
         distance = self.high_rad - self.low_rad
         # A move too short for the full velocity is a triangle.
-        ramp = min(self.velocity_rad_s / self.acceleration_rad_s2, math.sqrt(abs(distance) / self.acceleration_rad_s2))
+        ramp = min(
+            self.velocity_rad_s / self.acceleration_rad_s2,
+            math.sqrt(abs(distance) / self.acceleration_rad_s2),
+        )
         if ramp == 0.0:
             return Reference(self.low_rad, 0.0, 0.0)
         move = ramp + abs(distance) / (self.acceleration_rad_s2 * ramp)

@@ -14,6 +14,8 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.references import ReferenceSettings
 from dcmp_hil.values import Reference
 
+_FEWEST_ROWS = 2
+
 
 class Table(ReferenceSettings):
     """Columns `time_s` and `position_rad`; a cubic spline at rest at both ends, held after the last point."""
@@ -41,11 +43,13 @@ class Table(ReferenceSettings):
             from scipy.interpolate import CubicSpline
         except ImportError:
             raise ConfigError(
-                "reference.kind = \"csv\" needs scipy for its spline. Install it: pip install 'dcmp-hil[plot]'"
+                "reference.kind = \"csv\" needs scipy for its spline: pip install 'dcmp-hil[plot]'"
             ) from None
         columns = read_columns(Path(self.file), ("time_s", "position_rad"))
         time = columns["time_s"]
-        if len(time) < 2:
-            raise ConfigError(f"{self.file}: a reference needs at least two rows, got {len(time)}. Add points.")
+        if len(time) < _FEWEST_ROWS:
+            raise ConfigError(
+                f"{self.file}: a reference needs at least two rows, got {len(time)}. Add points."
+            )
         spline = CubicSpline(time - time[0], columns["position_rad"], bc_type="clamped")
         return spline.x.tolist(), spline.c.T.tolist()

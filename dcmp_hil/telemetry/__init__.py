@@ -1,0 +1,1 @@
+"""Telemetry: from the loop to everybody who looks on."""

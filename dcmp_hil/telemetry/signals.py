@@ -37,13 +37,33 @@ class Signal:
 SIGNALS = (
     Signal("position_rad", "joint/position_rad", "measured", TRUE, lambda b: b["position"]),
     Signal("position_true_rad", "joint/position_rad", "true (sim)", FAINT, lambda b: b["position_true"]),
-    Signal("position_estimate_rad", "joint/position_rad", "estimate", ESTIMATE, lambda b: b["position_estimate"]),
-    Signal("position_reference_rad", "joint/position_rad", "reference", REFERENCE, lambda b: b.reference[:, 0]),
-    Signal("velocity_true_rad_s", "joint/velocity_rad_s", "true (sim)", TRUE, lambda b: b["velocity_true"]),
-    Signal("velocity_estimate_rad_s", "joint/velocity_rad_s", "estimate", ESTIMATE, lambda b: b["velocity_estimate"]),
-    Signal("velocity_reference_rad_s", "joint/velocity_rad_s", "reference", REFERENCE, lambda b: b.reference[:, 1]),
     Signal(
-        "disturbance_true_rad_s2", "joint/disturbance_rad_s2", "true (sim)", TRUE, lambda b: b["disturbance_true"]
+        "position_estimate_rad", "joint/position_rad", "estimate", ESTIMATE, lambda b: b["position_estimate"]
+    ),
+    Signal(
+        "position_reference_rad", "joint/position_rad", "reference", REFERENCE, lambda b: b.reference[:, 0]
+    ),
+    Signal("velocity_true_rad_s", "joint/velocity_rad_s", "true (sim)", TRUE, lambda b: b["velocity_true"]),
+    Signal(
+        "velocity_estimate_rad_s",
+        "joint/velocity_rad_s",
+        "estimate",
+        ESTIMATE,
+        lambda b: b["velocity_estimate"],
+    ),
+    Signal(
+        "velocity_reference_rad_s",
+        "joint/velocity_rad_s",
+        "reference",
+        REFERENCE,
+        lambda b: b.reference[:, 1],
+    ),
+    Signal(
+        "disturbance_true_rad_s2",
+        "joint/disturbance_rad_s2",
+        "true (sim)",
+        TRUE,
+        lambda b: b["disturbance_true"],
     ),
     Signal(
         "disturbance_estimate_rad_s2",
@@ -53,7 +73,11 @@ SIGNALS = (
         lambda b: b["disturbance_estimate"],
     ),
     Signal(
-        "tracking_error_mrad", "control/tracking_error_mrad", "tracking error", ERROR, lambda b: 1e3 * b.tracking_error
+        "tracking_error_mrad",
+        "control/tracking_error_mrad",
+        "tracking error",
+        ERROR,
+        lambda b: 1e3 * b.tracking_error,
     ),
     Signal("voltage_demand_V", "control/voltage_V", "demanded", DEMAND, lambda b: b["voltage_demand"]),
     Signal("voltage_sent_V", "control/voltage_V", "sent", FAINT, lambda b: b["voltage_sent"]),

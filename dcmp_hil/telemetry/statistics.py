@@ -171,7 +171,9 @@ class Statistics:
             period_us=self.period.percentiles(),
             lateness_us=self.lateness.percentiles(),
             realtime_factor=realtime_factor,
-            window_s=(self._first_t, self._last_t + self._period) if self._periods else (self._from, self._from),
+            window_s=(self._first_t, self._last_t + self._period)
+            if self._periods
+            else (self._from, self._from),
         )
 
     def _add_voltage(self, voltage: NDArray[np.float64]) -> None:
