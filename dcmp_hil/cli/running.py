@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
@@ -56,14 +56,25 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
         sinks=sinks,
         keep_columns=picture,
     )
+    ended_by = "duration"
+    trip: TripError | None = None
     try:
         session.run()
-    except TripError as trip:
-        _conclude(session, options, folder, trip)
+        if session.stop.signal is not None:
+            ended_by = session.stop.signal.name
+    except TripError as error:
+        trip, ended_by = error, error.reason
         raise
-    _conclude(session, options, folder, None)
+    except KeyboardInterrupt:  # a second Ctrl-C, because something hung; 0 V was driven on the way out
+        ended_by = "KeyboardInterrupt"
+        return 128 + signal.SIGINT
+    except BaseException as error:
+        ended_by = type(error).__name__
+        raise
+    finally:
+        _conclude(session, options, folder, ended_by, trip)
     asked = session.stop.signal
-    return 0 if asked in (None, signal.SIGINT) else 128 + cast("signal.Signals", asked)
+    return 0 if asked in (None, signal.SIGINT) else 128 + asked
 
 
 def _sinks(rig: Rig, options: Options, folder: RunFolder | None) -> list[Sink]:
@@ -97,20 +108,21 @@ def _wants_picture(options: Options) -> bool:
     return _viewer(options) == "none"
 
 
-def _conclude(session: Session, options: Options, folder: RunFolder | None, trip: TripError | None) -> None:
+def _conclude(
+    session: Session, options: Options, folder: RunFolder | None, ended_by: str, trip: TripError | None
+) -> None:
     """Print and keep the figures, however the run ended."""
     result = session.result()
-    asked = session.stop.signal
     document: dict[str, Any] = {
         **asdict(result.summary),
         "rig": session.rig.name,
         "note": options.note,
         "version": __version__,
-        "ended_by": trip.reason if trip else asked.name if asked else "duration",
+        "ended_by": ended_by,
         "dropped_periods": result.dropped,
     }
     if options.json_file != "-":
-        console.out.print(summary_table(session.rig, result, document["ended_by"]))
+        console.out.print(summary_table(session.rig, result, ended_by))
     if folder is not None:
         folder.write(session.rig, document, result, trip)
         folder.tell(options.record, live=_viewer(options) != "none")

@@ -1,0 +1,85 @@
+# `make` alone lists the targets. Settings: PYTHON (the interpreter of a new environment), VENV (where it goes).
+
+PYTHON ?= python3
+VENV ?= .venv
+ARGS ?=
+
+BIN = $(VENV)/bin
+PIP = $(BIN)/python -m pip -qq --disable-pip-version-check --no-input
+INSTALL = $(PIP) install --require-hashes --only-binary :all: -r
+EDITABLE = $(PIP) install --no-deps --no-build-isolation --editable .
+COMPILE = $(BIN)/uv --quiet pip compile --universal --fork-strategy fewest --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" pyproject.toml --group build
+PYTEST = $(BIN)/python -m pytest -n 2
+
+RUN = $(VENV)/.installed-run
+DEV = $(VENV)/.installed-dev
+
+# Whatever the shell or pip.conf says, nothing from outside the environment gets in.
+unexport PYTHONPATH PYTHONHOME
+export PIP_USER = 0
+
+.DELETE_ON_ERROR:
+.PHONY: help run test check pytest bench lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+run: $(RUN) ## the simulated rig with its dashboard; ARGS="--help" for what else it takes
+	@$(BIN)/dcmp-hil run bench-1khz $(ARGS)
+
+test: check ## every check, then every test with coverage
+	@echo "Testing, with coverage ..."
+	@$(PYTEST) --cov --cov-report=term-missing $(ARGS)
+
+check: $(DEV) ## style, format, types, import contracts
+	@echo "Checking style ..."
+	@$(BIN)/ruff check
+	@echo "Checking format ..."
+	@$(BIN)/ruff format --check
+	@echo "Checking types ..."
+	@$(BIN)/mypy
+	@echo "Checking import contracts ..."
+	@$(BIN)/lint-imports --no-logo
+
+pytest: $(DEV) ## every test, without checks or coverage
+	@$(PYTEST) $(ARGS)
+
+bench: $(DEV) ## measure, print a table
+	@$(BIN)/python -m tools.bench $(ARGS)
+
+lock: | $(BIN)/uv ## pin again after a change in pyproject.toml; ARGS=--upgrade for newer versions
+	@echo "Pinning the dependencies ..."
+	@$(COMPILE) --extra plot --output-file requirements.txt $(ARGS)
+	@$(COMPILE) --extra plot --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
+
+clean: ## remove the environment, caches and reports; recordings in runs/ stay
+	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov .coverage .coverage.* \
+		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	@find dcmp_hil sim_backend tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# pip comes last into a new environment, so it is the sign of a complete one.
+$(BIN)/pip:
+	@"$(PYTHON)" --version >/dev/null 2>&1 || \
+		{ echo "There is no working $(PYTHON) here: install Python 3.11 or newer, or say make PYTHON=/path/to/python3." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "$$("$(PYTHON)" --version) is too old: Python 3.11 or newer is needed, say make PYTHON=/path/to/python3.11." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || \
+		{ echo "$(PYTHON) cannot make virtual environments, which Debian and Ubuntu package apart: apt install python3-venv" >&2; exit 1; }
+	@echo "Making the environment $(VENV) with $$("$(PYTHON)" --version) ..."
+	@"$(PYTHON)" -m venv $(VENV)
+
+$(RUN): requirements.txt pyproject.toml | $(BIN)/pip
+	@echo "Installing what the rig needs into $(VENV) (a minute or two the first time) ..."
+	@$(INSTALL) requirements.txt
+	@$(EDITABLE)
+	@touch $@
+
+$(DEV): requirements-dev.txt pyproject.toml | $(BIN)/pip
+	@echo "Installing what the tests need into $(VENV) (a minute or two the first time) ..."
+	@$(INSTALL) requirements-dev.txt
+	@$(EDITABLE)
+	@touch $(RUN) $@
+
+$(BIN)/uv: | $(BIN)/pip
+	@$(INSTALL) requirements-dev.txt
