@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from dcmp_hil.backends import KINDS as BACKENDS
 from dcmp_hil.config.sections import (
     AmplifierSection,
     BackendSection,
@@ -19,13 +20,15 @@ from dcmp_hil.config.sections import (
     SupervisorSection,
 )
 from dcmp_hil.controllers.pd_compensated import PdSettings
-from dcmp_hil.model import Model
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor
 from dcmp_hil.references.periodic import Chirp, Sine
 from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 from dcmp_hil.references.table import Table
 from dcmp_hil.section import Section
+
+if TYPE_CHECKING:
+    from dcmp_hil.model import Model
 
 _COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there
 
@@ -59,6 +62,21 @@ ReferenceSection = Annotated[
     | Annotated[Table, Tag("csv")],
     _kind_or_custom("sine"),
 ]
+
+
+KINDS: dict[str, dict[str, type[Section]]] = {
+    "observer": {"super_twisting": SuperTwistingSettings, "paper": PaperSettings, "custom": Custom},
+    "controller": {"pd_compensated": PdSettings, "pd": PdSettings, "custom": Custom},
+    "reference": {
+        "sine": Sine,
+        "chirp": Chirp,
+        "hold": Hold,
+        "step": Step,
+        "trapezoid": Trapezoid,
+        "csv": Table,
+    },
+}
+"""Tables that come in kinds, and what each kind has; the first is the default."""
 
 
 class Rig(Section):
@@ -117,7 +135,8 @@ def _step_divides_period(rig: Rig) -> str:
         return ""
     fits = rig.period * 1e6 / max(1, math.ceil(steps - 1e-9))
     return (
-        f"sim.step_us: got {rig.sim.step_us:g} us, which does not divide the period of {rig.period * 1e6:g} us "
+        f"sim.step_us: got {rig.sim.step_us:g} us, which does not divide the period of "
+        f"{rig.period * 1e6:g} us "
         f'(loop.rate_hz = {rig.loop.rate_hz:g}). {fits:g} us would, or write "auto".'
     )
 
@@ -128,13 +147,13 @@ def _floor_below_rate(rig: Rig) -> str:
         return ""
     usual = bandwidth_floor(rig.encoder.counts, rig.period)
     return (
-        f"observer.mu0_rad_s: got {mu0:g} rad/s, too fast for loop.rate_hz = {rig.loop.rate_hz:g}: at most "
-        f"{0.3 / rig.period:g} rad/s. Leave the key out to get {usual:.3g} rad/s, or raise the rate."
+        f"observer.mu0_rad_s: got {mu0:g} rad/s, too fast for loop.rate_hz = {rig.loop.rate_hz:g}: "
+        f"at most {0.3 / rig.period:g} rad/s. Leave the key out to get {usual:.3g} rad/s, or raise the rate."
     )
 
 
 def _simulation_only(rig: Rig) -> str:
-    """What no amplifier or encoder of iron may be run with."""
+    """Refuse what no amplifier or encoder of iron may be run with."""
     if rig.backend.kind == "sim" or ":" in rig.backend.kind:
         return ""
     loose = [
@@ -156,4 +175,11 @@ def _simulation_only(rig: Rig) -> str:
     )
 
 
-_RULES = (_step_divides_period, _floor_below_rate, _simulation_only)
+def _known_backend(rig: Rig) -> str:
+    kind = rig.backend.kind
+    if ":" in kind or kind in BACKENDS:
+        return ""
+    return f'backend.kind: got "{kind}"; expected {", ".join(BACKENDS)}, or "module:Factory" of your own.'
+
+
+_RULES = (_known_backend, _step_divides_period, _floor_below_rate, _simulation_only)

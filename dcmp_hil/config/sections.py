@@ -24,13 +24,13 @@ class BackendSection(Section):
     """`[backend]`: the way to the device."""
 
     kind: str = "sim"
-    """`sim`, or `module:Factory` of your own."""
+    """`sim`, or `module:Factory` of your own, made as Factory(rig, clock)."""
 
 
 class EncoderSection(Section):
     """`[encoder]`: what one count means."""
 
-    counts_per_rev: Annotated[float, Field(ge=16, le=2**24)] | Literal["ideal"] = 4096
+    counts_per_rev: Annotated[float, Field(ge=16, le=2**24)] | Literal["ideal"] = 4096.0
     """Counts a revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
 
     @property
@@ -69,9 +69,9 @@ class ModelSection(Section):
     """Gravity over inertia gmL/J, rad/s2."""
     ku_rad_s2_V: Annotated[float, Field(gt=0, le=10_000)] = 5.4
     """Motor and amplifier gain over inertia ku/J, (rad/s2)/V."""
-    eta_rad_s2: float = 0.84
+    eta_rad_s2: Annotated[float, Field(ge=-1000, le=1000)] = 0.84
     """External disturbance eta/J, constant part, rad/s2."""
-    eta_amplitude_rad_s2: float = 0.2
+    eta_amplitude_rad_s2: Annotated[float, Field(ge=-1000, le=1000)] = 0.2
     """External disturbance, swinging part, rad/s2."""
     eta_rate_rad_s: NotNegative = 0.2
     """Angular frequency of the swinging part, rad/s."""
@@ -92,7 +92,7 @@ class ModelSection(Section):
 class SimSection(Section):
     """`[sim]`: the simulated rig, where it differs from the believed one."""
 
-    step_us: Annotated[float, Field(gt=0, le=10_000)] | Literal["auto"] = "auto"
+    step_us: Annotated[float, Field(ge=1, le=10_000)] | Literal["auto"] = "auto"
     """Plant step, us; must divide the period. "auto": the largest divisor not above 200 us."""
     integrator: Literal["moreau", "euler"] = "moreau"
     """`moreau`: friction that can stick; `euler`: the paper's naive one."""
@@ -116,7 +116,7 @@ class SupervisorSection(Section):
     """`[supervisor]`: how a run starts, and what stops it."""
 
     start: Literal["engage", "immediate"] = "engage"
-    """`engage`: let the observer settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
+    """`engage`: settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only (simulation only)."""
     velocity_limit_rad_s: Positive = 20.0
@@ -141,5 +141,5 @@ class Custom(Section):
 
     kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
     """`module:Class`; the module must be importable from where the run is started."""
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = Field(default_factory=dict)
     """Handed to the class as keyword arguments."""
