@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
@@ -48,7 +49,7 @@ def load_rig(source: str | Path, overrides: Sequence[str] = ()) -> Rig:
     """
     text, place, folder = _read(source)
     table = _parse(text, place)
-    table.setdefault("name", Path(place).stem)
+    table.setdefault("name", re.sub(r"[^\w.-]+", "-", Path(place).stem)[:60] or "rig")
     set_keys = _override(table, overrides)
     try:
         rig = Rig.model_validate(table)

@@ -1,0 +1,86 @@
+"""Real processes: signals, and what stays behind."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+_BOUND = 60.0  # s: generous, these machines are shared
+
+
+def _start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "dcmp_hil", "run", "--viewer", "none", *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _wait_until_it_records(folder: Path) -> Path:
+    """Wait until the first blocks are in the recording: the run is really under way."""
+    deadline = time.monotonic() + _BOUND
+    while time.monotonic() < deadline:
+        for recording in folder.glob("runs/*/run.rrd"):
+            if recording.stat().st_size > 50_000:
+                return recording.parent
+        time.sleep(0.05)
+    raise AssertionError("the run never got under way")
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_run_keeps_what_was_recorded_when_signalled(
+    tmp_path: Path, number: signal.Signals, code: int
+) -> None:
+    process = _start(tmp_path, "--duration", "0", "--json", "figures.json")
+    folder = _wait_until_it_records(tmp_path)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=_BOUND)
+    figures = json.loads((folder / "summary.json").read_text())
+    assert process.returncode == code, err
+    assert "Traceback" not in err
+    assert figures["ended_by"] == number.name
+    assert figures["periods"] > 100
+    assert "tracking error" in out
+    assert (tmp_path / "figures.json").exists()
+
+
+def test_recording_is_readable_when_killed(tmp_path: Path) -> None:
+    from rerun.experimental import RrdReader
+
+    process = _start(tmp_path, "--duration", "0")
+    folder = _wait_until_it_records(tmp_path)
+    process.kill()
+    process.communicate(timeout=_BOUND)
+    chunks = list(RrdReader(folder / "run.rrd").stream())
+    assert any("position_rad" in str(chunk.entity_path) for chunk in chunks)
+
+
+def test_run_is_paced_by_the_wall_when_not_fast(tmp_path: Path) -> None:
+    process = _start(tmp_path, "--duration", "1", "--no-record", "--json", "-")
+    out, err = process.communicate(timeout=_BOUND)
+    figures = json.loads(out)
+    assert process.returncode == 0, err
+    assert figures["periods"] == 1000
+    assert (
+        figures["realtime_factor"] <= 1.01
+    )  # it never runs ahead of the wall; how far behind is the machine's affair
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; sys.argv = ['dcmp-hil', '--help']\n"
+        "from dcmp_hil.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print([m for m in ('numpy', 'rerun', 'pydantic', 'scipy', 'matplotlib', 'can') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
