@@ -20,6 +20,7 @@ from dcmp_hil.errors import DcmpError
 app = typer.Typer(
     help="Run a DC-motor pendulum: observer, controller, amplifier, live picture.",
     no_args_is_help=True,
+    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

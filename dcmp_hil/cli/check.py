@@ -8,19 +8,15 @@ from dcmp_hil.cli.options import Overrides, RigName
 
 def check(rig: RigName, overrides: Overrides = None) -> None:
     """Check a rig without running it: every fault at once, or every key with its value."""
-    from rich.table import Table
+    from rich.text import Text
 
     from dcmp_hil.config import load_rig
     from dcmp_hil.config.explain import explain, warnings
 
     loaded = load_rig(rig, overrides or ())
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_column(no_wrap=True)
-    table.add_column(style="bold")
-    table.add_column(style="dim")
-    for row in explain(loaded):
-        table.add_row(*row)
-    console.out.print(table)
+    for key, value, meaning in explain(loaded):
+        line = Text.assemble(f"{key:36}", (f"{value:18}", "bold"), (f" {meaning}", "dim"))
+        console.out.print(line, no_wrap=True, crop=console.out.is_terminal, overflow="ellipsis")
     for sentence in warnings(loaded):
         console.warn(sentence)
     console.out.print(f"[green]{loaded.name}: no faults[/green]")

@@ -1,54 +1,58 @@
-"""The table that ends a run."""
+"""The tables that end a run."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.console import Group
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.session import Result
-    from dcmp_hil.telemetry.statistics import Percentiles
 
 
-def summary_table(rig: Rig, result: Result, ended_by: str) -> Table:
-    """Lay the figures out: what, value, unit."""
+def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
+    """Lay the figures out: what, value, unit; then the durations, a quantile a column."""
+    start, stop = result.summary.window_s
+    title = Text.assemble((rig.name, "bold"), f"  {start:.2f} to {stop:.2f} s, ended by {ended_by}")
+    return Group(title, "", _figures(result), "", _durations(result))
+
+
+def _figures(result: Result) -> Table:
     figures = result.summary
-    start, stop = figures.window_s
-    table = Table(
-        title=f"{rig.name}: {start:.2f} to {stop:.2f} s, ended by {ended_by}",
-        title_justify="left",
-        show_header=False,
-        box=None,
-        padding=(0, 2, 0, 0),
-    )
-    table.add_column()
-    table.add_column(justify="right", style="bold")
-    table.add_column(style="dim")
-    truth = "against the true state" if figures.velocity_error_rms_rad_s is not None else "by the encoder"
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column(justify="right", style="bold", no_wrap=True)
+    table.add_column(style="dim", no_wrap=True)
+    judge = "true position" if figures.velocity_error_rms_rad_s is not None else "encoder"
     for what, value, unit in (
-        ("tracking error, RMS", _number(figures.tracking_rms_rad, 1e3), f"mrad, {truth}"),
+        ("tracking error, RMS", _number(figures.tracking_rms_rad, 1e3), f"mrad, by the {judge}"),
         ("tracking error, max", _number(figures.tracking_max_rad, 1e3), "mrad"),
         ("velocity error, RMS", _number(figures.velocity_error_rms_rad_s), "rad/s"),
         ("velocity error, max", _number(figures.velocity_error_max_rad_s), "rad/s"),
         ("disturbance error, RMS", _number(figures.disturbance_error_rms_rad_s2), "rad/s²"),
         ("voltage, peak", _number(figures.voltage_peak_V), "V"),
         ("voltage, total variation", _number(figures.voltage_tv_V_s), "V/s"),
-        ("periods, late", f"{figures.periods}, {figures.late_periods}", "late: by more than half a period"),
-        ("period p50 / p99 / p99.9 / max", _quantiles(figures.period_us), "µs"),
-        ("lateness p50 / p99 / p99.9 / max", _quantiles(figures.lateness_us), "µs"),
+        ("periods", str(figures.periods), f"{figures.late_periods} late, by half a period and more"),
         ("speed", f"{figures.realtime_factor:.4g}", "x real time"),
     ):
         table.add_row(what, value, unit)
     if result.dropped:
-        table.add_row("[yellow]periods lost to telemetry", str(result.dropped), "in no figure above")
+        table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
+    return table
+
+
+def _durations(result: Result) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
+    table.add_column("µs", no_wrap=True)
+    for quantile in ("p50", "p99", "p99.9", "max"):
+        table.add_column(quantile, justify="right", no_wrap=True)
+    for what, values in (("period", result.summary.period_us), ("lateness", result.summary.lateness_us)):
+        table.add_row(what, *(f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max)))
     return table
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:
     return "unknown" if value is None else f"{scale * value:.4g}"
-
-
-def _quantiles(values: Percentiles) -> str:
-    return " / ".join(f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max))
