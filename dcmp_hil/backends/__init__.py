@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, Self
 
+from dcmp_hil.backends.kinds import KINDS
 from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
@@ -13,9 +14,6 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Sample, Truth
-
-KINDS = {"sim": "sim_backend.backend:SimBackend"}
-"""Name in rig.toml to `module:factory`; a factory takes (rig, clock)."""
 
 
 class Backend(Protocol):

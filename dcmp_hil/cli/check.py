@@ -14,9 +14,10 @@ def check(rig: RigName, overrides: Overrides = None) -> None:
     from dcmp_hil.config.explain import explain, warnings
 
     loaded = load_rig(rig, overrides or ())
+    terminal = console.out.is_terminal
     for key, value, meaning in explain(loaded):
         line = Text.assemble(f"{key:36}", (f"{value:18}", "bold"), (f" {meaning}", "dim"))
-        console.out.print(line, no_wrap=True, crop=console.out.is_terminal, overflow="ellipsis")
+        console.out.print(line, no_wrap=True, crop=terminal, overflow="ellipsis" if terminal else "ignore")
     for sentence in warnings(loaded):
         console.warn(sentence)
     console.out.print(f"[green]{loaded.name}: no faults[/green]")

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from dcmp_hil.backends import KINDS as BACKENDS
+from dcmp_hil.backends.kinds import KINDS as BACKENDS
 from dcmp_hil.config.sections import (
     AmplifierSection,
     BackendSection,
     Custom,
+    CustomController,
     EncoderSection,
     LoopSection,
     ModelSection,
@@ -50,7 +51,7 @@ ObserverSection = Annotated[
 ControllerSection = Annotated[
     Annotated[PdSettings, Tag("pd_compensated")]
     | Annotated[PdSettings, Tag("pd")]
-    | Annotated[Custom, Tag("custom")],
+    | Annotated[CustomController, Tag("custom")],
     _kind_or_custom("pd_compensated"),
 ]
 ReferenceSection = Annotated[
@@ -66,7 +67,7 @@ ReferenceSection = Annotated[
 
 KINDS: dict[str, dict[str, type[Section]]] = {
     "observer": {"super_twisting": SuperTwistingSettings, "paper": PaperSettings, "custom": Custom},
-    "controller": {"pd_compensated": PdSettings, "pd": PdSettings, "custom": Custom},
+    "controller": {"pd_compensated": PdSettings, "pd": PdSettings, "custom": CustomController},
     "reference": {
         "sine": Sine,
         "chirp": Chirp,

@@ -143,3 +143,10 @@ class Custom(Section):
     """`module:Class`; the module must be importable from where the run is started."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Handed to the class as keyword arguments."""
+
+
+class CustomController(Custom):
+    """A controller of your own; the loop hands it the position that it asks for here."""
+
+    position: Literal["estimated", "measured"] = "estimated"
+    """Which position the controller is given: x1_hat (quiet) or the encoder's."""
