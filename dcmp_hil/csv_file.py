@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MOST_FAULTS = 5  # named one by one; the rest are counted
+_LONGEST_SHOWN = 40  # characters of a field
 _DELIMITERS = ",;\t"
 
 
@@ -51,8 +53,8 @@ def read_columns(path: Path, wanted: Sequence[str], *, time: str = "") -> dict[s
     Parameters
     ----------
     path
-        The file: UTF-8, fields separated by comma, semicolon or tab; lines that start with # are comments,
-        and so is a # in front of the header.
+        The file: UTF-8, fields separated by comma, semicolon or tab. Lines that start with # are comments,
+        but the last one is the header where numbers follow it.
     wanted
         Names of the columns to read; all must be there and hold finite numbers.
     time
@@ -90,10 +92,12 @@ def read_text(path: Path) -> Text:
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Check the path and its permissions.") from None
     except (ValueError, csv.Error) as error:  # no UTF-8, a NUL in the path, an open quote
-        raise ConfigError(f"{path}: not a CSV file ({error}). Save it as comma-separated UTF-8 text.") from None
+        raise ConfigError(
+            f"{path}: not a CSV file ({error}). Save it as comma-separated UTF-8 text."
+        ) from None
     if not any(header):
         raise ConfigError(f"{path}: empty, or its first line is. Name the columns in the first line.")
-    if all(_finite(name) is not None for name in header):
+    if not _are_names(header):
         raise ConfigError(
             f"{path}: the first line holds numbers ({', '.join(header[:4])}), not names. "
             "Put a line with the names of the columns in front, such as: time_s,position_rad,torque_Nm"
@@ -127,15 +131,27 @@ def pick_columns(text: Text, wanted: Sequence[str], *, time: str = "") -> dict[s
 
 
 def _split(file: TextIO) -> tuple[list[str], list[list[str]], list[int]]:
-    first = file.readline()
-    while first and not first.strip("\ufeff \t\r\n"):
-        first = file.readline()
-    delimiter = max(_DELIMITERS, key=first.count)  # the comma where there is none
-    header = next(csv.reader([first.lstrip("# \t")], delimiter=delimiter, strict=True), [])
-    before = 1  # blank lines in front of the header are rare enough not to be counted
-    reader = csv.reader(file, delimiter=delimiter, strict=True)
-    kept = [(row, reader.line_num + before) for row in _worth_keeping(reader)]
-    return [name.strip() for name in header], [row for row, _ in kept], [line for _, line in kept]
+    skipped, comment, first = 0, "", file.readline()
+    while first and (not first.strip() or first.startswith("#")):
+        comment = first if first.strip() else comment
+        skipped, first = skipped + 1, file.readline()
+    delimiter = max(_DELIMITERS, key=(first or comment).count)  # the comma where there is none
+    header = _fields(first, delimiter)
+    if comment and not _are_names(header):  # the last comment is the header, as numpy writes it
+        header, lines = _fields(comment.lstrip("# \t"), delimiter), chain([first], file)
+    else:
+        skipped, lines = skipped + 1, chain(file)
+    reader = csv.reader(lines, delimiter=delimiter, strict=True)
+    kept = [(row, reader.line_num + skipped) for row in _worth_keeping(reader)]
+    return header, [row for row, _ in kept], [line for _, line in kept]
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    return [name.strip() for name in next(csv.reader([line], delimiter=delimiter, strict=True), [])]
+
+
+def _are_names(header: list[str]) -> bool:
+    return any(_finite(name) is None for name in header if name)
 
 
 def _worth_keeping(rows: Iterator[list[str]]) -> Iterator[list[str]]:
@@ -143,25 +159,14 @@ def _worth_keeping(rows: Iterator[list[str]]) -> Iterator[list[str]]:
 
 
 def _numbers(text: Text, wanted: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    path, header = text.path, text.header
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise ConfigError(
-            f"{path}: no column {', '.join(missing)}; the header has: {', '.join(header)}. "
-            "Name the columns in the first line, or map them by options."
-        )
-    twice = [name for name in wanted if header.count(name) > 1]
-    if twice:
-        raise ConfigError(f"{path}: more than one column is called {', '.join(twice)}. Give each its own name.")
-    if not text.rows:
-        raise ConfigError(f"{path}: a header and no rows. Record something first.")
-    picked = [header.index(name) for name in wanted]
+    _check_names(text, wanted)
+    picked = [text.header.index(name) for name in wanted]
     values = np.full((len(text.rows), len(wanted)), math.nan)
     faults: list[str] = []
     for number, row in enumerate(text.rows):
-        if len(row) > len(header) and any(field.strip() for field in row[len(header) :]):
+        if any(field.strip() for field in row[len(text.header) :]):
             faults.append(
-                f"{text.place(number)}: {len(row)} fields, but the header names {len(header)} columns "
+                f"{text.place(number)}: {len(row)} fields, but the header names {len(text.header)} columns "
                 "(a decimal comma, perhaps; write a point)"
             )
             continue
@@ -176,12 +181,31 @@ def _numbers(text: Text, wanted: Sequence[str]) -> dict[str, NDArray[np.float64]
                 values[number, place] = value
     if faults:
         more = [f"... and {len(faults) - _MOST_FAULTS} more"] if len(faults) > _MOST_FAULTS else []
-        raise ConfigError(*faults[:_MOST_FAULTS], *more, "Mend or remove those rows; a lost sample may simply be left out.")
+        remedy = "Mend or remove those rows; a lost sample may simply be left out."
+        raise ConfigError(*faults[:_MOST_FAULTS], *more, remedy)
     return {name: values[:, place].copy() for place, name in enumerate(wanted)}
 
 
+def _check_names(text: Text, wanted: Sequence[str]) -> None:
+    missing = [name for name in wanted if name not in text.header]
+    if missing:
+        raise ConfigError(
+            f"{text.path}: no column {', '.join(missing)}; the header has: {', '.join(text.header)}. "
+            "Name the columns in the first line, or map them by options."
+        )
+    twice = [name for name in wanted if text.header.count(name) > 1]
+    if twice:
+        raise ConfigError(
+            f"{text.path}: more than one column is called {', '.join(twice)}. Give each its own name."
+        )
+    if not text.rows:
+        raise ConfigError(f"{text.path}: a header and no rows. Record something first.")
+
+
 def _shown(field: str) -> str:
-    return repr(field if len(field) <= 40 else field[:37] + "...") if field else "nothing"
+    if not field:
+        return "nothing"
+    return repr(field if len(field) <= _LONGEST_SHOWN else field[:_LONGEST_SHOWN] + "...")
 
 
 def _finite(text: str) -> float | None:
@@ -197,6 +221,6 @@ def _check_rising(text: Text, time: NDArray[np.float64], name: str) -> None:
     if len(stuck):
         k = int(stuck[0])
         raise ConfigError(
-            f"{text.place(k + 1)}: {name} goes from {time[k]:.9g} to {time[k + 1]:.9g}; time must rise from row to "
-            "row. Sort the rows, or remove the repeated ones."
+            f"{text.place(k + 1)}: {name} goes from {time[k]:.9g} to {time[k + 1]:.9g}; time must rise from "
+            "row to row. Sort the rows, or remove the repeated ones."
         )

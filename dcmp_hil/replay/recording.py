@@ -9,7 +9,7 @@ import numpy as np
 
 from dcmp_hil.csv_file import pick_columns, read_text
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.columns import match
+from dcmp_hil.replay.names import match
 from dcmp_hil.replay.units import COUNTS
 
 if TYPE_CHECKING:
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.replay.columns import Match
+    from dcmp_hil.csv_file import Text
+    from dcmp_hil.replay.names import Match
     from dcmp_hil.replay.settings import InputKind
     from dcmp_hil.replay.units import Quantity
 
 _FEWEST_ROWS = 20
 _LARGEST = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong
 _TURN = 2.0 * np.pi
+_NEARLY = 0.1  # turns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +111,7 @@ class Recording:
         stuck = np.flatnonzero(np.diff(self.time) <= 0.0)
         if len(stuck):
             raise ConfigError(
-                f"{self.name}, row {stuck[0] + 2}: time does not rise. Sort the rows, or remove the repeated ones."
+                f"{self.name}, row {stuck[0] + 2}: time does not rise. Sort the rows or remove repeated ones."
             )
 
     def _unbelievable(self, name: str, values: NDArray[np.float64]) -> str:
@@ -144,14 +146,16 @@ def read_recording(path: Path, options: ColumnOptions | None = None) -> Recordin
     """
     options = options or ColumnOptions()
     text = read_text(path)
-    time = _required("time", text.header, options)
-    position = _required("position", text.header, options)
-    torque_or_voltage = _input(text.header, options)
+    time = _required("time", text, options)
+    position = _required("position", text, options)
+    torque_or_voltage = _input(text, options)
     velocity = match("velocity", text.header, options.velocity, options.velocity_unit)
     found = [column for column in (time, position, torque_or_voltage, velocity) if column]
     names = [column.column for column in found]
     if len(set(names)) < len(names):
-        raise ConfigError(f"{path}: one column is used twice ({', '.join(names)}). Give each quantity its own.")
+        raise ConfigError(
+            f"{path}: one column is used twice ({', '.join(names)}). Give each quantity its own."
+        )
     values = pick_columns(text, names, time=time.column)
     si = {column.quantity: values[column.column] * _size(column, options) for column in found}
     unwrapped, turns = _unwrap(si["position"])
@@ -167,33 +171,32 @@ def read_recording(path: Path, options: ColumnOptions | None = None) -> Recordin
     )
 
 
-def _required(quantity: Quantity, header: Sequence[str], options: ColumnOptions) -> Match:
-    found = _find(quantity, header, options)
+def _required(quantity: Quantity, text: Text, options: ColumnOptions) -> Match:
+    found = _find(quantity, text.header, options)
     if found is None:
         raise ConfigError(
-            f"No column looks like {quantity}; the header has: {', '.join(header)}. "
+            f"{text.path}: no column looks like {quantity}; the header has: {', '.join(text.header)}. "
             f"Name it: --{quantity} COLUMN (and its unit, if it is not SI: --{quantity}-unit)."
         )
     return found
 
 
-def _input(header: Sequence[str], options: ColumnOptions) -> Match:
-    torque, voltage = _find("torque", header, options), _find("voltage", header, options)
+def _input(text: Text, options: ColumnOptions) -> Match:
     if options.torque is not None and options.voltage is not None:
         raise ConfigError("--torque and --voltage: a replay takes one input. Leave one of them out.")
-    if options.torque is not None or options.voltage is not None:
-        torque, voltage = (torque, None) if options.torque is not None else (None, voltage)
+    torque = _find("torque", text.header, options) if options.voltage is None else None
+    voltage = _find("voltage", text.header, options) if options.torque is None else None
     if torque and voltage and options.prefer:
         torque, voltage = (torque, None) if options.prefer == "torque" else (None, voltage)
     if torque and voltage:
         raise ConfigError(
-            f'The file has a torque ("{torque.column}") and a voltage ("{voltage.column}"). '
+            f'{text.path} has a torque ("{torque.column}") and a voltage ("{voltage.column}"). '
             f'Say which one is the input: --torque "{torque.column}" or --voltage "{voltage.column}".'
         )
     found = torque or voltage
     if found is None:
         raise ConfigError(
-            f"No column looks like torque or voltage; the header has: {', '.join(header)}. "
+            f"{text.path}: no column looks like torque or voltage; the header has: {', '.join(text.header)}. "
             "Name it: --torque COLUMN or --voltage COLUMN."
         )
     return found
@@ -208,16 +211,17 @@ def _size(column: Match, options: ColumnOptions) -> float:
         return column.size
     if options.counts_per_rev is None:
         raise ConfigError(
-            f'The position "{column.column}" is in counts. Say how many make a revolution: --counts-per-rev N.'
+            f'The position "{column.column}" is in counts. Say how many make a turn: --counts-per-rev N.'
         )
     return _TURN / options.counts_per_rev
 
 
 def _unwrap(position: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """Undo jumps of a turn, and count them; no arm makes nine tenths of a turn between two rows."""
-    unwrapped = np.unwrap(position, discont=0.9 * _TURN)
-    turns = int(np.count_nonzero(np.round(np.diff(unwrapped - position) / _TURN)))
-    return (unwrapped if turns else position), turns
+    """Undo jumps of a turn, and count them: no arm makes nine tenths of a turn between two rows."""
+    jumps = np.diff(position) / _TURN
+    turns = np.where(np.abs(np.abs(jumps) - 1.0) < _NEARLY, np.sign(jumps), 0.0)
+    places = int(np.count_nonzero(turns))
+    return (position - _TURN * np.concatenate(([0.0], np.cumsum(turns))) if places else position), places
 
 
 def _notes(column: Match, turns: int) -> list[str]:
@@ -226,7 +230,7 @@ def _notes(column: Match, turns: int) -> list[str]:
         notes.append(f"The position jumps by a turn in {turns} places: unwrapped.")
     if "applied" in column.column.lower():
         notes.append(
-            f'"{column.column}" sounds like the input of the period that ended, as in recordings of dcmp-hil: '
+            f'"{column.column}" sounds like the input of the period that ended, as dcmp-hil records it: '
             "that is --input-at end."
         )
     return notes

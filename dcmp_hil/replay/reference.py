@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _ORDER = 3
+_FASTEST = 0.45  # cycles a sample: below 0.5 by more than the steps of a grid differ from the period
+_PADDING = 2.0  # periods of the corner: what the slowest pole leaves after them is 0.2 %
+_LEAST_PADDING = 4 * _ORDER  # samples, what scipy takes
 
 
 class ZeroPhase(NamedTuple):
@@ -47,8 +50,8 @@ def zero_phase(
     bridges lost samples. A gap longer than `longest_gap` is not bridged: what lies before and after it is
     filtered on its own.
 
-    The ends are continued by odd reflection over half a period of the corner (scipy's own 12 samples are too
-    few at high rates), and still are the least certain part.
+    The ends are continued by odd reflection over two periods of the corner: with scipy's own 12 samples the
+    velocity at an end in motion is 14 % off at 333 Hz, and more at higher rates.
 
     Parameters
     ----------
@@ -70,10 +73,10 @@ def zero_phase(
     ConfigError
         If scipy is missing, or the sampling is too slow for the corner.
     """
-    if cutoff * period >= 0.5:
+    if cutoff * period > _FASTEST:
         raise ConfigError(
-            f"A usual step of {period:g} s ({1.0 / period:.4g} Hz) is too slow for a reference of {cutoff:g} Hz, "
-            f"which needs more than {2.0 * cutoff:g} Hz. Check --time-unit, or lower the corner by --cutoff."
+            f"A usual step of {period:g} s ({1.0 / period:.4g} Hz) is too slow for a reference of {cutoff:g} "
+            f"Hz, which needs {cutoff / _FASTEST:.3g} Hz. Check --time-unit, or lower --cutoff."
         )
     velocity, disturbance = np.full(len(time), np.nan), np.full(len(time), np.nan)
     breaks = np.flatnonzero(np.diff(time) > longest_gap) + 1
@@ -82,9 +85,9 @@ def zero_phase(
         # Around a row, u is the mean of the steps on either side of it.
         around = 0.5 * (applied[rows] + np.append(applied[first + 1 : last], applied[last - 1]))
         grid = _even(time[rows], period)
-        pad = max(4 * _ORDER, round(0.5 / (cutoff * period)))
-        if len(grid) <= pad:
+        if len(grid) <= _LEAST_PADDING:
             continue
+        pad = min(len(grid) - 1, max(_LEAST_PADDING, round(_PADDING / (cutoff * period))))
         smooth, u = (
             _both_ways(np.interp(grid, time[rows], values), cutoff * (grid[1] - grid[0]), pad)
             for values in (position[rows], around)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _SMALLEST = 1e-9  # rad: below it lies the rounding of arithmetic, not an encoder
 _TRIES = 50
@@ -13,6 +17,7 @@ _FITTING = 0.95  # of the steps; a few may be glitches
 _MISFIT = 0.15  # counts; 30 % of random steps would pass
 
 _TURN = 2.0 * np.pi
+_MOST_COUNTS = 2.0**24
 
 
 def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
@@ -47,3 +52,26 @@ def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
         if len(short) >= _FEWEST and np.mean(fits) >= _FITTING:
             return float(_TURN / np.median(short[fits] / multiples[fits]))
     return None
+
+
+def equivalent_counts_per_rev(position: NDArray[np.float64]) -> float | None:
+    """Return the encoder whose quantisation would scatter like a position without visible steps.
+
+    The scatter is taken from the third differences, in which a smooth motion all but vanishes, by their
+    median, so that glitches do not matter: white noise of standard deviation s gives sqrt(20) s there, and an
+    encoder's step q scatters by q / sqrt(12).
+
+    Parameters
+    ----------
+    position
+        rad, shape (n,), n > 3.
+
+    Returns
+    -------
+    float or None
+        Counts a revolution, at most 2^24; None for a position that does not change.
+    """
+    scatter = 1.4826 * float(np.median(np.abs(np.diff(position, 3)))) / np.sqrt(20.0)
+    if scatter <= 0.0:
+        return None
+    return float(min(_TURN / (np.sqrt(12.0) * scatter), _MOST_COUNTS))

@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.model import Model
-from dcmp_hil.observers import Setting
-from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
-from dcmp_hil.plugins import find_named
-from dcmp_hil.replay.figures import Figures, judge
+from dcmp_hil.replay.figures import Figures, judge, sampling
+from dcmp_hil.replay.preparation import prepare
 from dcmp_hil.replay.reference import ZeroPhase, zero_phase
-from dcmp_hil.replay.resolution import estimate_counts_per_rev
-from dcmp_hil.replay.settings import IDEAL, ReplaySettings
-from dcmp_hil.values import Sample
+from dcmp_hil.replay.settings import ReplaySettings
+from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from dcmp_hil.observers import Observer
     from dcmp_hil.replay.recording import Recording
 
-_LONGEST_GAP = 10.02  # periods: both observers restart after a longer one
-_KINDS = ("super_twisting", "paper")
+_LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
+_ROUNDING = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
+_RUNAWAY = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
+
+
+class Estimates(NamedTuple):
+    """What the observer believed, row by row.
+
+    Parameters
+    ----------
+    position, velocity, disturbance
+        rad, rad/s, rad/s2, shape (n,).
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    disturbance: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +50,8 @@ class ReplayResult:
         What was replayed.
     applied
         N m or V, shape (n,): the input over the step that ended at the row, by `input_at`.
-    position, velocity, disturbance
-        Estimates, rad, rad/s, rad/s2, shape (n,).
+    estimates
+        Position, velocity and disturbance.
     reference
         Zero-phase velocity and disturbance.
     judged
@@ -56,9 +64,7 @@ class ReplayResult:
 
     recording: Recording
     applied: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    disturbance: NDArray[np.float64]
+    estimates: Estimates
     reference: ZeroPhase
     judged: NDArray[np.bool_]
     figures: Figures
@@ -85,47 +91,59 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
         missing, or nothing is left to judge.
     """
     settings = settings or ReplaySettings()
-    gain = _gain(recording, settings)
-    period = float(np.median(np.diff(recording.time))) if settings.period is None else settings.period
-    counts, how = _resolution(recording, settings)
-    setting = Setting(Model(f0=settings.f0, ku=1.0), period, counts)
-    observer = _make(settings, setting)
-    applied = _over_the_step_before(recording.input, settings)
+    set_up = prepare(recording, settings)
+    period, gap = set_up.setting.period, _LONGEST_GAP * set_up.setting.period
     reference = zero_phase(
         recording.time,
         recording.position,
-        gain * applied,
+        set_up.setting.model.ku * set_up.voltage,
         period=period,
         f0=settings.f0,
-        longest_gap=_LONGEST_GAP * period,
+        longest_gap=gap,
         cutoff=settings.cutoff,
     )
-    judged = _judged(recording.time, _LONGEST_GAP * period, settings.start) & np.isfinite(reference.velocity)
+    settled = _since_restart(recording.time, gap) > settings.start + _ROUNDING
+    judged = settled & np.isfinite(reference.velocity)
     if not judged.any():
         raise ConfigError(
-            f"{recording.name}: no row is left to judge after the first {settings.start:g} s "
-            f"(and as long after every gap). Record longer, or write a smaller --from."
+            f"{recording.name}: no row is left to judge after the first {settings.start:g} s, and as long "
+            f"after every gap of more than {gap:g} s. "
+            "Check --time-unit, record longer, or write a smaller --from."
         )
-    estimates = _run(observer, recording, gain * applied)
-    figures = judge(
-        recording,
-        estimates,
-        reference,
-        judged,
-        period=period,
-        counts=counts,
-        mu0=observer.mu0 if isinstance(observer, SuperTwisting) else None,
-        restarts=int(np.count_nonzero(np.diff(recording.time) > _LONGEST_GAP * period)),
-    )
-    notes = (*recording.notes, *how, *_doubts(figures, settings))
+    estimates = _run(set_up.observer, recording, set_up.voltage)
     return ReplayResult(
         recording=recording,
-        applied=applied,
-        position=estimates[0],
-        velocity=estimates[1],
-        disturbance=estimates[2],
+        applied=set_up.applied,
+        estimates=estimates,
         reference=reference,
         judged=judged,
-        figures=figures,
-        notes=notes,
+        figures=Figures(
+            **sampling(recording.time, period, gap),
+            **judge(recording, estimates, reference, judged),
+            counts_per_rev=set_up.setting.counts_per_rev,
+            mu0_rad_s=set_up.observer.mu0 if isinstance(set_up.observer, SuperTwisting) else None,
+        ),
+        notes=recording.notes + set_up.notes,
     )
+
+
+def _since_restart(time: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+    """Return how long the observer has been running at each row, s."""
+    begins = np.concatenate(([True], np.diff(time) > gap))
+    return time - time[np.maximum.accumulate(np.where(begins, np.arange(len(time)), 0))]
+
+
+def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64]) -> Estimates:
+    """Run the line without a loop: one sample a row, its time counted from the first row."""
+    elapsed = recording.time - recording.time[0]
+    rows = np.empty((len(elapsed), len(Estimate._fields)))
+    samples = zip(elapsed.tolist(), recording.position.tolist(), voltage.tolist(), strict=True)
+    for k, (t, position, applied) in enumerate(samples):
+        rows[k] = observer.update(Sample(t, position, applied))
+    away = np.flatnonzero(~(np.abs(rows) < _RUNAWAY).all(axis=1))
+    if len(away):
+        raise ConfigError(
+            f"{recording.name}: the observer runs away at row {away[0] + 1}. Check the units and the inertia "
+            "(or ku), or write smaller gains."
+        )
+    return Estimates(*rows.T)

@@ -29,8 +29,8 @@ class ReplaySettings:
     """Viscous friction over inertia fd/J, 1/s."""
     inertia: float | None = None
     """J, kg m2: turns a torque into the input u = torque / J. Required with a torque."""
-    ku: float = 5.4
-    """ku/J, (rad/s2)/V: turns a voltage into the input u = ku V. Unused with a torque."""
+    ku: float | None = None
+    """ku/J, (rad/s2)/V: turns a voltage into u = ku V; None: 5.4, the paper's. Unused with a torque."""
     input_at: Literal["start", "end"] = "start"
     """Which row holds the input over [k-1, k): `start` is row k-1, `end` is row k."""
     counts_per_rev: float | Literal["ideal"] | None = None
@@ -58,16 +58,15 @@ class ReplaySettings:
             if not (least < value <= most if open_ else least <= value <= most)
         ]
         if self.input_at not in ("start", "end"):
-            faults.append(f'--input-at: got "{self.input_at}". Write start (the value in row k-1) or end (row k).')
+            faults.append(f'--input-at: got "{self.input_at}". Write start (row k-1) or end (row k).')
         if self.mu0 is not None and self.observer == "paper":
-            faults.append("--mu0: the paper's observer has no bandwidth floor. Leave it out, or use super_twisting.")
+            faults.append("--mu0: the paper's observer has no bandwidth floor. Leave the option out.")
         if faults:
             raise ConfigError(*faults)
 
     def _ranges(self) -> list[tuple[str, float, str, float, float, bool, str]]:
-        """Option, value, unit, least, most, whether the least itself is out, remedy; of those that are set."""
+        """Of those that are set: option, value, unit, least, most, whether the least is out, remedy."""
         counts = None if self.counts_per_rev == IDEAL else self.counts_per_rev
-        most_M = "Leave it out for the default."
         rows: list[tuple[str, float | str | None, str, float, float, bool, str]] = [
             ("--f0", self.f0, " 1/s", 0.0, 1e3, False, "It is the viscous friction over the inertia."),
             ("--inertia", self.inertia, " kg m2", 0.0, 1e6, True, "Give J in kg m2."),
@@ -76,7 +75,7 @@ class ReplaySettings:
             ("--period", self.period, " s", 1e-6, 10.0, False, "Leave it out to take the median step."),
             ("--L1", self.L1, " 1/s", 0.0, 1e4, True, "The paper's is 4.9."),
             ("--L2", self.L2, " 1/s2", 0.0, 1e4, True, "The paper's is 5.51."),
-            ("--M", self.M, " rad/s3", 0.0, 1e9, self.observer == "paper", most_M),
+            ("--M", self.M, " rad/s3", 0.0, 1e9, self.observer == "paper", "Leave it out for the default."),
             ("--mu0", self.mu0, " rad/s", 0.0, 1e6, False, "Leave it out to go by the rule."),
             ("--from", self.start, " s", 0.0, 1e9, False, "Write the seconds to leave out at the start."),
             ("--cutoff", self.cutoff, " Hz", 0.0, 1e5, True, "The usual one is 15 Hz."),

@@ -91,5 +91,7 @@ def known_unit(quantity: Quantity, spelling: str) -> tuple[str, float]:
     unit = find_unit(quantity, spelling)
     if unit is None:
         usual = ", ".join(names[0] for names in _SPELLINGS[quantity].values())
-        raise ConfigError(f'--{quantity}-unit: got "{spelling}", which is no unit of {quantity}. Write one of: {usual}.')
+        raise ConfigError(
+            f'--{quantity}-unit: got "{spelling}", which is no unit of {quantity}. Write one of: {usual}.'
+        )
     return unit

@@ -14,20 +14,29 @@ if TYPE_CHECKING:
 
     from dcmp_hil.replay.units import Quantity
 
+# Words that a quantity goes by, the likeliest first.
 _NAMES: dict[Quantity, tuple[str, ...]] = {
-    "time": ("time", "t", "timestamp", "stamp", "timestamps", "times", "elapsed", "clock"),
-    "position": ("position", "pos", "q", "angle", "theta", "phi", "x", "x1", "y", "positions", "joint", "encoder"),
-    "torque": ("torque", "tau", "trq", "torques", "u"),
-    "voltage": ("voltage", "volt", "volts", "u", "v", "voltages"),
-    "velocity": ("velocity", "vel", "speed", "omega", "qd", "dq", "qdot", "thetadot", "x2", "velocities", "v"),
+    "time": ("time", "t", "timestamp", "stamp", "elapsed", "clock", "times", "timestamps"),
+    "position": ("position", "pos", "q", "angle", "theta", "phi", "x", "x1", "y", "joint", "encoder"),
+    "torque": ("torque", "tau", "trq", "u"),
+    "voltage": ("voltage", "volt", "volts", "u", "v"),
+    "velocity": ("velocity", "vel", "speed", "omega", "qd", "dq", "qdot", "thetadot", "x2", "v"),
 }
 _UNSURE = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
-_MEASURED = {"meas", "measured", "actual", "act", "real", "fb", "feedback", "applied", "given", "mes"}
-_PLAIN = _MEASURED | {"motor", "joint", "pendulum", "arm", "shaft", "output", "encoder", "angle", "angular", "rel"}
-_COMMAND = {"cmd", "command", "commanded", "des", "desired", "demand", "demanded", "sent", "ctrl", "control"}
-_OTHER = {"ref", "reference", "target", "setpoint", "goal", "error", "err", "estimate", "estimated", "est", "hat"}
-_OTHER |= {"true", "filtered", "filt", "limit", "min", "max", "std", "constant", "offset", "index", "id"}
-_OTHER |= {"acceleration", "accel", "acc", "current", "temperature", "temp", "bus", "supply", "battery", "dc"}
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+# What a name may add to one of these words: nothing of consequence, that it is the command rather than the
+# measurement, or that it is something else altogether.
+_PLAIN = _words("""measured meas mes actual act real fb feedback applied given rel
+    motor joint pendulum arm shaft output encoder angle angular""")
+_COMMAND = _words("command commanded cmd desired des demand demanded sent control ctrl")
+_OTHER = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered filt
+    limit min max std constant offset index id acceleration accel acc current temperature temp
+    bus supply battery dc""")
 
 
 class Match(NamedTuple):
@@ -89,7 +98,11 @@ def match(quantity: Quantity, header: Sequence[str], column: str | None, unit: s
     if unit is not None:
         return Match(quantity, name, *known_unit(quantity, unit), "option")
     _, found = _parts(quantity, name)
-    return Match(quantity, name, *found, "name") if found else Match(quantity, name, SI[quantity], 1.0, "assumed")
+    return (
+        Match(quantity, name, *found, "name")
+        if found
+        else Match(quantity, name, SI[quantity], 1.0, "assumed")
+    )
 
 
 def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
@@ -108,7 +121,8 @@ def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
     best = [name for rank, name in ranked if rank == ranked[0][0]]
     if len(best) > 1:
         raise ConfigError(
-            f"{quantity}: {' and '.join(best)} look equally likely. Say which one it is: --{quantity} \"{best[0]}\"."
+            f"{quantity}: {' and '.join(best)} look equally likely. "
+            f'Say which one it is: --{quantity} "{best[0]}".'
         )
     return best[0] if best else None
 

@@ -1,0 +1,114 @@
+"""Carrying a replay out: read, run, write, show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from rich.table import Table
+
+from dcmp_hil.cli import console
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.replay import read_recording, replay, write_csv, write_rrd
+
+if TYPE_CHECKING:
+    from dcmp_hil.replay import ColumnOptions, ReplayResult, ReplaySettings
+
+
+class Outputs(NamedTuple):
+    """Where everything goes.
+
+    Parameters
+    ----------
+    json
+        Of the figures; ``-`` for standard output, None for nowhere.
+    csv, rrd
+        Of the columns; None for the default name in the current folder.
+    by_default
+        Whether the default names are written at all.
+    """
+
+    json: str | None
+    csv: Path | None
+    rrd: Path | None
+    by_default: bool
+
+
+def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, outputs: Outputs) -> None:
+    """Replay a file, then write and show what came of it.
+
+    Raises
+    ------
+    ConfigError
+        As `read_recording` and `replay`; or if a file would overwrite the recording or cannot be written.
+    """
+    csv, rrd = _targets(file, outputs)
+    result = replay(read_recording(file, columns), settings)
+    for column in result.recording.columns:
+        console.note(str(column))
+    for sentence in result.notes:
+        console.note(sentence)
+    if outputs.json != "-":
+        console.out.print(_table(file, settings, result))
+    if outputs.json is not None:
+        console.write_json(outputs.json, result.figures.to_dict())
+    if csv is not None:
+        write_csv(result, csv)
+        console.note(f"wrote {csv}")
+    if rrd is not None:
+        write_rrd(result, rrd)
+        console.note(f"wrote {rrd}")
+
+
+def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
+    """Where CSV and .rrd go: never onto the recording itself."""
+    named = outputs.csv, outputs.rrd
+    defaults = (Path(f"{file.stem}-replay{suffix}") for suffix in (".csv", ".rrd"))
+    csv, rrd = (
+        target or (default if outputs.by_default else None)
+        for target, default in zip(named, defaults, strict=True)
+    )
+    for target in (csv, rrd, None if outputs.json in (None, "-") else Path(str(outputs.json))):
+        if target is not None and target.resolve() == file.resolve():
+            raise ConfigError(f"{target} is the recording itself. Write elsewhere: --csv, --rrd, --json.")
+    return csv, rrd
+
+
+def _table(file: Path, settings: ReplaySettings, result: ReplayResult) -> Table:
+    figures = result.figures
+    first, last = figures.window_s
+    table = Table(
+        title=f"{file.name}: {settings.observer}, {first:.2f} to {last:.2f} s",
+        title_justify="left",
+        show_header=False,
+        box=None,
+        padding=(0, 2, 0, 0),
+    )
+    table.add_column()
+    table.add_column(justify="right", style="bold")
+    table.add_column(style="dim")
+    against = f"{settings.cutoff:g} Hz zero phase"
+    periods = f"{1e3 * figures.period_median_s:.4g} / {1e3 * figures.period_max_s:.4g}"
+    gaps = f"{figures.lost_samples}, {figures.restarts}"
+    counts = "ideal" if figures.counts_per_rev is None else f"{figures.counts_per_rev:.0f}"
+    for what, value, unit in (
+        ("velocity error, RMS", _number(figures.velocity_error_rms_rad_s), f"rad/s, {against}"),
+        ("velocity error, max", _number(figures.velocity_error_max_rad_s), "rad/s"),
+        ("velocity in the file, RMS error", _number(figures.given_velocity_error_rms_rad_s), "rad/s"),
+        ("velocity in the file, max error", _number(figures.given_velocity_error_max_rad_s), "rad/s"),
+        ("disturbance, RMS", _number(figures.disturbance_rms_rad_s2), "rad/s²"),
+        ("disturbance, mean", _number(figures.disturbance_mean_rad_s2), "rad/s²"),
+        ("disturbance error, RMS", _number(figures.disturbance_error_rms_rad_s2), f"rad/s², {against}"),
+        ("disturbance with -sin(position)", _number(figures.disturbance_sin_correlation), "correlation"),
+        ("rows, judged", f"{figures.rows}, {figures.rows_judged}", f"in {figures.duration_s:.4g} s"),
+        ("lost samples, restarts", gaps, "gaps above 10 periods"),
+        ("period, median / max", periods, "ms"),
+        ("counts per revolution", counts, ""),
+        ("mu0", _number(figures.mu0_rad_s), "rad/s"),
+    ):
+        table.add_row(what, value, unit)
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.4g}"

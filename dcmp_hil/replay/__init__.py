@@ -1,0 +1,31 @@
+"""Replay: an observer over any recording of position and torque or voltage, judged by a zero-phase reference.
+
+recording = read_recording(Path("swingup.csv"))
+result = replay(recording, ReplaySettings(inertia=0.16))
+result.figures.velocity_error_rms_rad_s
+"""
+
+from dcmp_hil.replay.export import columns, write_csv, write_rrd
+from dcmp_hil.replay.figures import Figures
+from dcmp_hil.replay.recording import ColumnOptions, Recording, read_recording
+from dcmp_hil.replay.reference import ZeroPhase, zero_phase
+from dcmp_hil.replay.resolution import estimate_counts_per_rev
+from dcmp_hil.replay.run import Estimates, ReplayResult, replay
+from dcmp_hil.replay.settings import ReplaySettings
+
+__all__ = [
+    "ColumnOptions",
+    "Estimates",
+    "Figures",
+    "Recording",
+    "ReplayResult",
+    "ReplaySettings",
+    "ZeroPhase",
+    "columns",
+    "estimate_counts_per_rev",
+    "read_recording",
+    "replay",
+    "write_csv",
+    "write_rrd",
+    "zero_phase",
+]
