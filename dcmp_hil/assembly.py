@@ -51,7 +51,7 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
         recent=max(1, round(rig.loop.rate_hz)),
         in_line=in_line,
     )
-    measured = isinstance(rig.controller, PdSettings) and rig.controller.position == "measured"
+    measured = rig.controller.position == "measured"
     line = Line(
         backend=backend,
         observer=make_observer(rig, trajectory),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,22 @@ if TYPE_CHECKING:
 
     from dcmp_hil.replay.recording import Recording
     from dcmp_hil.replay.reference import ZeroPhase
-    from dcmp_hil.replay.run import Estimates
 
 _NOTHING = 1e-12  # rad/s2: what rounding leaves of a constant
+
+
+class Estimates(NamedTuple):
+    """What the observer believed, row by row.
+
+    Parameters
+    ----------
+    position, velocity, disturbance
+        rad, rad/s, rad/s2, shape (n,).
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    disturbance: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

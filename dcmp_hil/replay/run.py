@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.observers.super_twisting import SuperTwisting
-from dcmp_hil.replay.figures import Figures, judge, sampling
+from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
 from dcmp_hil.replay.preparation import prepare
 from dcmp_hil.replay.reference import ZeroPhase, zero_phase
 from dcmp_hil.replay.settings import ReplaySettings
@@ -24,20 +24,6 @@ if TYPE_CHECKING:
 _LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
 _ROUNDING = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
 _RUNAWAY = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
-
-
-class Estimates(NamedTuple):
-    """What the observer believed, row by row.
-
-    Parameters
-    ----------
-    position, velocity, disturbance
-        rad, rad/s, rad/s2, shape (n,).
-    """
-
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    disturbance: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
