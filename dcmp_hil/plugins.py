@@ -36,6 +36,8 @@ def find_named(path: str, key: str, known: Iterable[str] = ()) -> Callable[..., 
             f'Did you mean "{close[0]}"?' if close else f"Write one of {', '.join(known)}, or module:Class."
         )
         raise ConfigError(f'{key}: got "{path}", which is unknown. {hint}')
+    if not all(part.isidentifier() for part in module_name.split(".")):
+        raise ConfigError(f'{key}: got "{path}"; expected module:Class, such as my_lab.rig:Motor.')
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample
 
 
-_NO_FRICTION, _SERIES_BELOW = 1e-9, 1e-2  # of f0 T
+_NO_FRICTION, _SERIES_BELOW = 1e-17, 1e-2  # of f0 T; below the first, 1 - f0 T is 1
 
 
 class Predictor:

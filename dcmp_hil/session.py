@@ -82,7 +82,7 @@ class Session:
         keep_columns: bool = True,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
-        _check_times(rig, length, window_from, fast=fast)
+        _check_times(length, window_from, fast=fast)
         self.rig = rig
         self._length = length or math.inf
         self._statistics = Statistics(rig.period, window_from)
@@ -177,7 +177,7 @@ def run(
     return session.result()
 
 
-def _check_times(rig: Rig, length: float, window_from: float, *, fast: bool) -> None:
+def _check_times(length: float, window_from: float, *, fast: bool) -> None:
     if not 0.0 <= length < math.inf:
         raise ConfigError(f"duration: got {length}; expected seconds, 0 (until Ctrl-C) or more.")
     if not 0.0 <= window_from < (length or math.inf):
@@ -187,8 +187,3 @@ def _check_times(rig: Rig, length: float, window_from: float, *, fast: bool) -> 
         )
     if fast and length == 0.0:
         raise ConfigError("duration: 0 (until Ctrl-C) and virtual time would never end. Give a duration.")
-    if fast and rig.backend.kind != "sim" and ":" not in rig.backend.kind:
-        raise ConfigError(
-            f'fast: backend.kind = "{rig.backend.kind}" runs in real time; '
-            'virtual time needs backend.kind = "sim".'
-        )

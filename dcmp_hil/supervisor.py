@@ -103,8 +103,9 @@ class Supervisor:
         """Return the authority of the first two phases, V; full authority ends the second."""
         if self.phase is Phase.SETTLING:
             return 0.0
-        if t - self._since < self._engage:
-            return self._limit * (t - self._since) / self._engage
+        gone = t - self._since
+        if gone < self._engage:
+            return self._limit * gone / self._engage if gone > 0.0 else 0.0  # the limit may be infinite
         self._enter(Phase.RUNNING, t)
         return self._limit
 

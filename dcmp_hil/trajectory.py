@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dcmp_hil.references.piecewise import trapezoid
 from dcmp_hil.values import Reference
 
 if TYPE_CHECKING:
@@ -38,8 +37,8 @@ class Trajectory:
         self._t0, self._x0, self._begun = t, position, True
 
     def lower(self, t: float) -> None:
-        """From `t` on, go down to hanging in `LOWERING` seconds; at most one turn is undone."""
-        self._way_down = _WayDown(t, self.at(t).position)
+        """From `t` on, go down to position 0, hanging, in `LOWERING` seconds; nothing jumps."""
+        self._way_down = _WayDown(t, self.at(t))
 
     def at(self, t: float) -> Reference:
         """Return the reference at device time `t`."""
@@ -68,9 +67,22 @@ def _faded_in(reference: Reference, x0: float, s: float, length: float) -> Refer
 
 @dataclass(frozen=True, slots=True)
 class _WayDown:
+    """The quintic that takes over position, velocity and acceleration at `t0` and ends in rest at 0."""
+
     t0: float
-    x0: float
+    start: Reference
 
     def at(self, t: float) -> Reference:
-        x, v, a = trapezoid((t - self.t0) / LOWERING, 1.0 / 3.0)
-        return Reference(self.x0 * (1.0 - x), -self.x0 * v / LOWERING, -self.x0 * a / LOWERING**2)
+        length = LOWERING
+        s = min((t - self.t0) / length, 1.0)
+        x, v, a = self.start.position, length * self.start.velocity, 0.5 * length**2 * self.start.acceleration
+        # x0 left^3 (1 + 3 s + 6 s^2) + v0 left^3 (s + 3 s^2) + a0 left^3 s^2 / 2 with left = 1 - s
+        left = 1.0 - s
+        p0, p1, p2 = x, 3.0 * x + v, 6.0 * x + 3.0 * v + a
+        p = p0 + s * (p1 + s * p2)
+        dp, ddp = p1 + 2.0 * s * p2, 2.0 * p2
+        return Reference(
+            left**3 * p,
+            left**2 * (left * dp - 3.0 * p) / length,
+            left * (left * left * ddp - 6.0 * left * dp + 6.0 * p) / length**2,
+        )

@@ -35,6 +35,8 @@ class SimBackend:
         What to sleep on.
     """
 
+    simulated = True
+
     def __init__(self, rig: Rig, clock: Clock) -> None:
         self._clock = clock
         self._period = rig.period

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol, Self
 
 from dcmp_hil.backends.kinds import KINDS
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
@@ -17,7 +19,11 @@ if TYPE_CHECKING:
 
 
 class Backend(Protocol):
-    """A device. A context manager: leaving it drives 0 V, however it is left."""
+    """A device. A context manager: leaving it drives 0 V, however it is left.
+
+    A factory whose devices are simulated says so by an attribute `simulated = True`; only then it is given
+    virtual time, or a rig without limits.
+    """
 
     def __enter__(self) -> Self:
         """Open the device, disarmed."""
@@ -48,8 +54,24 @@ def open_backend(rig: Rig, clock: Clock) -> Backend:
     Raises
     ------
     ConfigError
-        If there is none by that name.
+        If there is none by that name, or it is a real device and the rig or the clock is not for one.
     """
     kind = rig.backend.kind
     factory: Callable[[Rig, Clock], Backend] = find_named(KINDS.get(kind, kind), "backend.kind", KINDS)
+    if not getattr(factory, "simulated", False):
+        _refuse_simulation_only(rig, clock)
     return factory(rig, clock)
+
+
+def _refuse_simulation_only(rig: Rig, clock: Clock) -> None:
+    """Keep from a real device what only a simulation survives."""
+    if isinstance(clock, SimulatedClock):
+        raise ConfigError(
+            f'fast: backend.kind = "{rig.backend.kind}" runs in real time; virtual time needs a simulated '
+            'rig: backend.kind = "sim", or a Factory with the attribute `simulated = True`.'
+        )
+    if rig.simulation_only:
+        raise ConfigError(
+            f'backend.kind: got "{rig.backend.kind}", but {", ".join(rig.simulation_only)} is for simulation '
+            'only. Set backend.kind = "sim", or start from the rig bench-1khz.'
+        )

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dcmp_hil.cli import console
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
 
 
 def rigs(
@@ -26,7 +29,11 @@ def rigs(
     for name in shipped_rigs():
         rig = load_rig(name)
         console.out.print(
-            f"[bold]{name:12}[/bold] {rig.loop.rate_hz:g} Hz, encoder {rig.encoder.counts_per_rev}, "
+            f"[bold]{name:12}[/bold] {rig.loop.rate_hz:g} Hz, encoder {_counts(rig)}, "
             f"observer {rig.observer.kind}, backend {rig.backend.kind}",
             highlight=False,
         )
+
+
+def _counts(rig: Rig) -> str:
+    return "ideal" if rig.encoder.counts is None else f"{rig.encoder.counts:g} counts"
