@@ -1,0 +1,186 @@
+"""What the tests of the core share: rigs, cached runs, and simulated rigs that misbehave."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import random
+from typing import TYPE_CHECKING, Any
+
+from dcmp_hil import load_rig, run
+from dcmp_hil.model import Model
+from dcmp_hil.observers import Setting
+from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing, Truth
+from sim_backend.backend import SimBackend
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.telemetry.statistics import Summary
+    from sim_backend.plant import Plant
+
+T = 1e-3  # s, the bench rig's period
+STEADY = ("supervisor.start=immediate", "sim.position_rad=-1.57")
+"""What the figures of docs/theory start from: the paper's pose, the trajectory at once."""
+
+_numbers = itertools.count()
+
+
+def bench(*overrides: str) -> Rig:
+    """Return the shipped bench rig with overrides in dotted form."""
+    return load_rig("bench-1khz", overrides)
+
+
+@functools.cache
+def figures(*overrides: str, duration: float = 30.13, window_from: float = 5.0) -> Summary:
+    """Run the bench rig from the paper's pose in virtual time; the window of the tables is 5..30.13 s."""
+    rig = bench(*STEADY, *overrides)
+    return run(rig, duration=duration, fast=True, window_from=window_from).summary
+
+
+def named(make: Callable[..., Any]) -> str:
+    """Give a class or factory made inside a test a name that rig.toml can hold."""
+    name = f"made_{next(_numbers)}"
+    globals()[name] = make
+    return f"{__name__}:{name}"
+
+
+def known(value: float | None) -> float:
+    """Return a figure that must be known."""
+    assert value is not None
+    return value
+
+
+def setting(*, period: float = T, counts: float | None = 4096.0, f0: float = 0.1) -> Setting:
+    """Return an observer's setting with the paper's pendulum."""
+    return Setting(Model(f0=f0), period, counts)
+
+
+def cycle(
+    t: float,
+    *,
+    position: float = 0.0,
+    applied: float = 0.0,
+    estimate: Estimate = Estimate(0.0, 0.0, 0.0),
+    reference: Reference = Reference(0.0, 0.0, 0.0),
+    sent: float = 0.0,
+    timing: Timing = Timing(T, 0.0, 0.0),
+) -> Cycle:
+    """Make a period for whoever looks on."""
+    return Cycle(Sample(t, position, applied), estimate, reference, sent, sent, timing)
+
+
+class PlantSees:
+    """A plant that gets another voltage than the amplifier reports."""
+
+    def __init__(self, plant: Plant, changed: Callable[[float], float]) -> None:
+        self._plant, self._changed = plant, changed
+
+    def advance(self, voltage: float) -> Truth:
+        return self._plant.advance(self._changed(voltage))
+
+
+class FaultySim(SimBackend):
+    """The simulated rig with a fault from `fault_at(rig)` on, drawn by `sim.seed`."""
+
+    earliest, latest = 4.0, 4.0 + 4.0 * math.pi  # s: one period of sin(t/2), after the soft start
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        super().__init__(rig, clock)
+        self.fault_at = self.instant(rig)
+        self._t = 0.0
+
+    @classmethod
+    def instant(cls, rig: Rig) -> float:
+        """Return when the fault begins, s."""
+        return random.Random(rig.sim.seed).uniform(cls.earliest, cls.latest)
+
+    def read(self) -> Sample:
+        sample = super().read()
+        self._t = sample.t
+        return sample
+
+
+class StuckEncoder(FaultySim):
+    """Shows the last good position for ever."""
+
+    _last = 0.0
+
+    def read(self) -> Sample:
+        sample = super().read()
+        if sample.t >= self.fault_at:
+            return sample._replace(position=self._last)
+        self._last = sample.position
+        return sample
+
+
+class LostPower(FaultySim):
+    """The voltage is reported, and never reaches the motor."""
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        super().__init__(rig, clock)
+        self._plant = PlantSees(self._plant, lambda v: v if self._t < self.fault_at else 0.0)
+
+
+class Reversed(FaultySim):
+    """The motor turns the other way."""
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        super().__init__(rig, clock)
+        self._plant = PlantSees(self._plant, lambda v: v if self._t < self.fault_at else -v)
+
+
+class ReversedFromTheStart(Reversed):
+    """The motor was wired the wrong way round."""
+
+    earliest = latest = 0.0
+
+
+class DemandedVoltage(SimBackend):
+    """An amplifier that saturates at 10 V and reports what it was asked for: the mistake of theory 3.1.
+
+    The rig must say `amplifier.voltage_limit_V = "none"`, or the host would clamp first.
+    """
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        clamped = rig.amplifier.model_copy(update={"voltage_limit_V": 10.0})
+        super().__init__(rig.model_copy(update={"amplifier": clamped}), clock)
+        self._asked = [0.0, 0.0]
+        self.written: list[float] = []
+
+    def write(self, voltage: float) -> None:
+        super().write(voltage)
+        self.written.append(voltage)
+        self._asked = [self._asked[1], voltage]
+
+    def read(self) -> Sample:
+        return super().read()._replace(voltage=self._asked[0])
+
+
+class LosesSamples(SimBackend):
+    """One sample in twenty never arrives."""
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        super().__init__(rig, clock)
+        self._luck = random.Random(rig.sim.seed)
+
+    def read(self) -> Sample:
+        sample = super().read()
+        while self._luck.random() < 0.05:
+            sample = super().read()
+        return sample
+
+
+class IgnoresGaps:
+    """The default observer, made to believe that every sample comes one period after the last."""
+
+    def __init__(self, setting: Setting) -> None:
+        self._observer, self._period, self._ticks = SuperTwisting(setting), setting.period, 0
+
+    def update(self, sample: Sample) -> Estimate:
+        self._ticks += 1
+        return self._observer.update(sample._replace(t=self._ticks * self._period))
