@@ -23,7 +23,8 @@ def paper(
     from dcmp_hil.cli.paper_view import misprint_table, reproduction_table
     from dcmp_hil.paper import as_json, draw, reproduce
 
-    reproduction = reproduce()
+    with console.err.status("running the paper's simulation, as meant and as printed ..."):
+        reproduction = reproduce()
     if json_file is not None:
         console.write_json(json_file, as_json(reproduction.rows))
     if json_file != "-":
