@@ -23,6 +23,8 @@ def paper(
     from dcmp_hil.cli.paper_view import misprint_table, reproduction_table
     from dcmp_hil.paper import as_json, draw, reproduce
 
+    if not no_figures:
+        console.make_folder(out)  # a place that cannot be written shows now, not after the runs
     with console.err.status("running the paper's simulation, as meant and as printed ..."):
         reproduction = reproduce()
     if json_file is not None:
