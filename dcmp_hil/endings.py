@@ -23,10 +23,12 @@ class StopRequest:
         self.requested = False
         self.signal: signal.Signals | None = None  # what asked, if a signal did
         self._before: dict[signal.Signals, object] = {}
+        self._entered = 0
 
     def __enter__(self) -> Self:
-        """Install the handlers."""
-        if threading.current_thread() is threading.main_thread():
+        """Install the handlers; entering again changes nothing."""
+        self._entered += 1
+        if self._entered == 1 and threading.current_thread() is threading.main_thread():
             for number in _SIGNALS:
                 self._before[number] = signal.signal(number, self._ask)
         return self
@@ -34,7 +36,10 @@ class StopRequest:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Put the handlers of before back."""
+        """Put the handlers of before back, when the outermost leaves."""
+        self._entered -= 1
+        if self._entered:
+            return
         for number, handler in self._before.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
         self._before.clear()

@@ -69,6 +69,8 @@ class Session:
         Who else looks on.
     keep_columns
         False for long runs: memory then stays bounded.
+    stop
+        Asked once a period; its own unless somebody listens for signals earlier already.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Session:
         window_from: float = 0.0,
         sinks: Sequence[Sink] = (),
         keep_columns: bool = True,
+        stop: StopRequest | None = None,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
@@ -90,7 +93,7 @@ class Session:
         self._wall = MonotonicClock()
         own: list[Sink] = [self._statistics, *([self._keeper] if self._keeper else [])]
         clock = SimulatedClock() if fast else self._wall
-        self.stop = StopRequest()
+        self.stop = stop or StopRequest()
         self._line, self._recorder = assemble(rig, clock, [*own, *sinks], in_line=fast)
         self._realtime_factor = math.nan
 
@@ -105,23 +108,22 @@ class Session:
             If the device or the way to it fails.
         """
         line, recorder = self._line, self._recorder
-        began_ns, t = self._wall.now_ns(), 0.0
+        began_ns = self._wall.now_ns()
         try:
             with self.stop, line.backend:
                 t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
                 if self.rig.run.end == "lower" and not self.stop.requested:
                     recorder.event(Event(t, "INFO", "lowering the arm"))
                     line.trajectory.lower(t + line.delay)
-                    t = loop.run(line, t + line.delay + LOWERING, self.stop)
+                    loop.run(line, t + line.delay + LOWERING, self.stop)
         except TripError as trip:
             trip.cycles = tuple(recorder.recent)
-            t = trip.cycles[-1].sample.t
-            recorder.event(Event(t, "ERROR", f"tripped ({trip.reason}): {trip}"))
+            recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
             raise
         finally:
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
-            self._realtime_factor = t / wall if wall > 0 else math.nan
-            recorder.event(Event(t, "INFO", "amplifier at 0 V"))
+            self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
+            recorder.event(Event(recorder.t, "INFO", "amplifier at 0 V"))
             recorder.close()
 
     def result(self) -> Result:

@@ -31,7 +31,7 @@ class Amplifier:
         self._plain = math.isinf(slew) and dead_zone == 0.0 and quantum == 0.0
         self._newest = 0.0
         self._waiting = deque([0.0] * delay_samples)
-        self._output = 0.0
+        self._ramp = 0.0  # V, the slewed command
         self.live = False
 
     def command(self, voltage: float) -> None:
@@ -41,7 +41,7 @@ class Amplifier:
     def release(self) -> None:
         """Go to 0 V at once and stay there."""
         self.live = False
-        self._newest = self._output = 0.0
+        self._newest = self._ramp = 0.0
         self._waiting = deque([0.0] * len(self._waiting))
 
     def step(self) -> float:
@@ -52,11 +52,13 @@ class Amplifier:
         wanted = self._waiting.popleft()
         limit = self._limit
         wanted = limit if wanted > limit else max(wanted, -limit)
-        self._output = wanted if self._plain else self._shaped(wanted)
-        return self._output
+        return wanted if self._plain else self._shaped(wanted)
 
     def _shaped(self, wanted: float) -> float:
-        output = max(self._output - self._slew, min(self._output + self._slew, wanted))
+        # The ramp goes on underneath quantiser and dead zone, or a slow one would never leave them.
+        self._ramp = output = max(self._ramp - self._slew, min(self._ramp + self._slew, wanted))
         if self._quantum:
             output = self._quantum * round(output / self._quantum)
+            if abs(output) > self._limit:
+                output -= math.copysign(self._quantum, output)
         return 0.0 if abs(output) < self._dead_zone else output

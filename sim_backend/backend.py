@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 _PLANTS: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
-_FORGIVEN = 10  # periods behind, after which the pace starts afresh instead of being caught up
+_FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
 
 
 class SimBackend:
@@ -41,7 +41,6 @@ class SimBackend:
         self._clock = clock
         self._period = rig.period
         self._period_ns = 1e9 * rig.period
-        self._forgiven_ns = _FORGIVEN * self._period_ns
         self._start_ns = 0
         self._tick = 0
         self._plant = _plant(rig)
@@ -108,7 +107,7 @@ class SimBackend:
         deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
         self._clock.sleep_until_ns(deadline_ns)
         behind_ns = self._clock.now_ns() - deadline_ns
-        if behind_ns > self._forgiven_ns:
+        if behind_ns > _FORGIVEN_NS:
             self._start_ns += behind_ns  # after a stop of the process: no burst of old periods
 
 

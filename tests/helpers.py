@@ -6,12 +6,14 @@ import functools
 import itertools
 import math
 import random
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import load_rig, run
 from dcmp_hil.model import Model
 from dcmp_hil.observers import Setting
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.session import Session
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing, Truth
 from sim_backend.backend import SimBackend
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.session import Result
     from dcmp_hil.telemetry.statistics import Summary
     from sim_backend.plant import Plant
 
@@ -65,13 +68,23 @@ def cycle(
     *,
     position: float = 0.0,
     applied: float = 0.0,
-    estimate: Estimate = Estimate(0.0, 0.0, 0.0),
-    reference: Reference = Reference(0.0, 0.0, 0.0),
     sent: float = 0.0,
-    timing: Timing = Timing(T, 0.0, 0.0),
 ) -> Cycle:
     """Make a period for whoever looks on."""
-    return Cycle(Sample(t, position, applied), estimate, reference, sent, sent, timing)
+    nothing = (0.0, 0.0, 0.0)
+    return Cycle(
+        Sample(t, position, applied), Estimate(*nothing), Reference(*nothing), sent, sent, Timing(T, 0.0, 0.0)
+    )
+
+
+def spoilt(sample: Sample, field: str, value: float) -> Sample:
+    """Return the sample with one of its numbers replaced."""
+    return Sample(**{**sample._asdict(), field: value})
+
+
+def last(plant: Plant, periods: int, voltage: float = 0.0) -> Truth:
+    """Let a plant run and return its last state."""
+    return [plant.advance(voltage) for _ in range(periods)][-1]
 
 
 class PlantSees:
@@ -140,6 +153,22 @@ class ReversedFromTheStart(Reversed):
     earliest = latest = 0.0
 
 
+class DelayedPlant(SimBackend):
+    """The voltage reaches the motor some periods later than anybody knows."""
+
+    periods = 0
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        super().__init__(rig, clock)
+        waiting = deque([0.0] * self.periods)
+
+        def later(voltage: float) -> float:
+            waiting.append(voltage)
+            return waiting.popleft()
+
+        self._plant = PlantSees(self._plant, later)
+
+
 class DemandedVoltage(SimBackend):
     """An amplifier that saturates at 10 V and reports what it was asked for: the mistake of theory 3.1.
 
@@ -150,11 +179,9 @@ class DemandedVoltage(SimBackend):
         clamped = rig.amplifier.model_copy(update={"voltage_limit_V": 10.0})
         super().__init__(rig.model_copy(update={"amplifier": clamped}), clock)
         self._asked = [0.0, 0.0]
-        self.written: list[float] = []
 
     def write(self, voltage: float) -> None:
         super().write(voltage)
-        self.written.append(voltage)
         self._asked = [self._asked[1], voltage]
 
     def read(self) -> Sample:
@@ -184,3 +211,59 @@ class IgnoresGaps:
     def update(self, sample: Sample) -> Estimate:
         self._ticks += 1
         return self._observer.update(sample._replace(t=self._ticks * self._period))
+
+
+class HeldRun:
+    """A run in virtual time whose backend the test holds in its hands.
+
+    Parameters
+    ----------
+    overrides
+        Of the bench rig.
+    duration
+        s.
+    on_read
+        Called with the number of the sample (from 0) and the sample; returns the sample to pass on.
+    base
+        The simulated rig.
+    session
+        Further arguments of Session.
+    """
+
+    def __init__(
+        self,
+        *overrides: str,
+        duration: float = 1.0,
+        on_read: Callable[[int, Sample], Sample] | None = None,
+        on_write: Callable[[float], None] | None = None,
+        base: type[SimBackend] = SimBackend,
+        **session: Any,
+    ) -> None:
+        held = self
+        self.reads = 0
+        self.written: list[float] = []
+
+        class Held(base):  # type: ignore[misc, valid-type]
+            def __init__(self, rig: Rig, clock: Clock) -> None:
+                super().__init__(rig, clock)
+                held.backend = self
+
+            def read(self) -> Sample:
+                sample: Sample = super().read()
+                held.reads += 1
+                return on_read(held.reads - 1, sample) if on_read else sample
+
+            def write(self, voltage: float) -> None:
+                if on_write:
+                    on_write(voltage)
+                super().write(voltage)
+                held.written.append(voltage)
+
+        self.backend: SimBackend
+        rig = bench(f"backend.kind={named(Held)}", *overrides)
+        self.session = Session(rig, duration=duration, fast=True, **session)
+
+    def run(self) -> Result:
+        """Run to the end and return the result."""
+        self.session.run()
+        return self.session.result()

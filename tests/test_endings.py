@@ -17,10 +17,11 @@ _ALL = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 def test_stop_request_notes_the_signal_and_puts_the_handlers_back(number: signal.Signals) -> None:
     before = [signal.getsignal(each) for each in _ALL]
     with StopRequest() as stop:
-        assert not stop.requested
+        asked = [stop.requested]
         os.kill(os.getpid(), number)
-        assert stop.requested
-        assert stop.signal is number
+        asked.append(stop.requested)
+    assert asked == [False, True]
+    assert stop.signal is number
     assert [signal.getsignal(each) for each in _ALL] == before
 
 

@@ -10,7 +10,7 @@ from dcmp_hil.assembly import make_supervisor
 from dcmp_hil.errors import TripError
 from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
 from dcmp_hil.values import Estimate, Fault, Sample
-from tests.helpers import T, bench
+from tests.helpers import T, bench, spoilt
 
 _SAMPLE, _ESTIMATE = Sample(1.0, 0.1, 2.0), Estimate(0.1, 0.5, -3.0)
 _NOT_FINITE = [math.nan, math.inf, -math.inf]
@@ -42,7 +42,7 @@ def test_finite_lets_a_healthy_period_pass() -> None:
 @pytest.mark.parametrize("bad", _NOT_FINITE)
 @pytest.mark.parametrize("field", ["t", "position", "voltage"])
 def test_finite_objects_when_a_number_of_the_sample_is_not_finite(field: str, bad: float) -> None:
-    assert _reason(Finite(), sample=_SAMPLE._replace(**{field: bad})) == "not_finite"
+    assert _reason(Finite(), sample=spoilt(_SAMPLE, field, bad)) == "not_finite"
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
@@ -132,7 +132,7 @@ def test_the_rigs_monitors_trip_in_the_same_period_when_anything_is_not_finite(
     if field.startswith("estimate."):
         estimate = estimate._replace(**{field.removeprefix("estimate."): bad})
     else:
-        sample = sample._replace(**{field: bad})
+        sample = spoilt(sample, field, bad)
     assert supervisor.admit(sample, estimate, 1.0) == 0.0
     assert supervisor.trip is not None
     assert supervisor.trip.reason == "not_finite"

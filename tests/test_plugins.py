@@ -48,9 +48,7 @@ def test_find_named_says_what_a_module_lacks(tmp_path: Path, monkeypatch: pytest
         find_named("module_with_missing_import:Class", "observer.kind")
 
 
-def test_find_named_lets_a_users_own_mistake_through(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_find_named_lets_a_users_own_mistake_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A fault inside the user's module is his to see whole, traceback and all.
     (tmp_path / "module_with_mistake.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcmp_hil.references.periodic import Sine
-from dcmp_hil.references.piecewise import Hold
 from dcmp_hil.trajectory import LOWERING, Trajectory
 from tests.helpers import figures, known
 

@@ -13,6 +13,7 @@ from dcmp_hil.cli.status import StatusLine
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
+from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import TripError
 from dcmp_hil.session import Session
 
@@ -44,24 +45,27 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     rig = load_rig(rig_name, overrides)
     for sentence in warnings(rig):
         console.warn(sentence)
+    with StopRequest() as stop:  # from here on: opening a viewer takes its time, too
+        return _run(rig, options, stop)
+
+
+def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
     folder = RunFolder(rig.name) if options.keep else None
-    sinks = _sinks(rig, options, folder)
     length = rig.run.duration_s if options.duration is None else options.duration
-    picture = folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options)
     session = Session(
         rig,
         duration=options.duration,
         fast=options.fast,
         window_from=options.window_from,
-        sinks=sinks,
-        keep_columns=picture,
+        sinks=_sinks(rig, options, folder),
+        keep_columns=folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options),
+        stop=stop,
     )
     ended_by = "duration"
     trip: TripError | None = None
     try:
         session.run()
-        if session.stop.signal is not None:
-            ended_by = session.stop.signal.name
+        ended_by = stop.signal.name if stop.signal else ended_by
     except TripError as error:
         trip, ended_by = error, error.reason
         raise
@@ -73,8 +77,7 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
         raise
     finally:
         _conclude(session, options, folder, ended_by, trip)
-    asked = session.stop.signal
-    return 0 if asked in (None, signal.SIGINT) else 128 + asked
+    return 0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal
 
 
 def _sinks(rig: Rig, options: Options, folder: RunFolder | None) -> list[Sink]:

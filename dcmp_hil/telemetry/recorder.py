@@ -92,9 +92,14 @@ class Recorder:
         self._events.append(event)
 
     @property
+    def t(self) -> float:
+        """Device time of the last period, s; 0 before the first."""
+        return self.recent[-1].sample.t if self.recent else 0.0
+
+    @property
     def dropped(self) -> int:
-        """Rows lost because the sinks were too slow."""
-        return self._ring.dropped
+        """Rows lost because the sinks were too slow; after `close`, those never handed on as well."""
+        return self._ring.dropped + (len(self._ring) if self._done.is_set() else 0)
 
     def close(self) -> None:
         """Hand on what is left and close the sinks; waits for a stuck sink for 2 s at most."""
@@ -111,21 +116,27 @@ class Recorder:
 
     def _finish(self) -> None:
         self._hand_on()
-        self._tell(lambda sink: sink.close())
+        self._hand_on_events()  # a sink that gave up at the last block is news as well
+        while self._sinks:  # the last one first, so that those before it hear if it gives up
+            self._tell(lambda sink: sink.close(), [self._sinks.pop()])
+            self._hand_on_events()
 
-    def _hand_on(self) -> None:
+    def _hand_on_events(self) -> None:
         while self._events:
             event = self._events.popleft()
             self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
+
+    def _hand_on(self) -> None:
+        self._hand_on_events()
         rows = self._ring.drain()
         if len(rows):
             block = self._aligner.block(rows)
             self._tell(lambda sink: sink.block(block))
 
-    def _tell(self, call: Callable[[Sink], None]) -> None:
-        for sink in tuple(self._sinks):
+    def _tell(self, call: Callable[[Sink], None], sinks: Sequence[Sink] | None = None) -> None:
+        for sink in tuple(self._sinks if sinks is None else sinks):
             try:
                 call(sink)
             except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
-                self._sinks.remove(sink)
-                self.event(Event(0.0, "WARN", f"{type(sink).__name__} gave up and was dropped: {error}"))
+                self._sinks = [other for other in self._sinks if other is not sink]
+                self.event(Event(self.t, "WARN", f"{type(sink).__name__} gave up and was dropped: {error}"))

@@ -75,17 +75,18 @@ def test_run_shows_every_figure_when_on_screen(cli: Cli) -> None:
 
 
 def test_run_exits_4_and_keeps_black_box_when_it_trips(cli: Cli, tmp_path: Path) -> None:
-    outcome = cli("run", "--fast", "--duration", "5", "--set", "supervisor.velocity_limit_rad_s=0.1")
+    step = ("--set", "reference.kind=step", "--set", "reference.at_s=3.0")
+    outcome = cli("run", "--fast", "--duration", "5", *step, "--set", "supervisor.velocity_limit_rad_s=2")
     (folder,) = (tmp_path / "runs").iterdir()
     figures = json.loads((folder / "summary.json").read_text())
     with (folder / "black_box.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert outcome.code == 4
     assert outcome.err.count("error:") == 1
-    assert "0.1 rad/s" in outcome.err
+    assert "2 rad/s" in outcome.err
     assert figures["ended_by"] == "speed"
     assert len(rows) == 1000  # one second at 1 kHz
-    assert abs(float(rows[-1]["velocity_estimate_rad_s"])) > 0.1  # the cycle that tripped is the last one
+    assert abs(float(rows[-1]["velocity_estimate_rad_s"])) > 2.0  # the cycle that tripped is the last one
     assert float(rows[-1]["voltage_sent_V"]) == 0.0
     assert float(rows[-1]["t_s"]) - float(rows[0]["t_s"]) == pytest.approx(0.999)
 

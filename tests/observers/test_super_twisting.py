@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dcmp_hil.errors import ProtocolError
 from dcmp_hil.observers.super_twisting import SuperTwisting, bandwidth_floor, slope_bound
 from dcmp_hil.values import Estimate, Sample
-from tests.helpers import T, setting
+from tests.helpers import T, setting, spoilt
 from tests.observers.matrix_observer import L1, L2, MatrixObserver
 
 _steps = st.lists(
@@ -99,8 +99,7 @@ def test_super_twisting_stays_exactly_at_rest_when_nothing_moves() -> None:
     # b = 0 in every period but for rounding; without the cap a tiny b ends in cos(inf).
     observer = SuperTwisting(setting(), mu0=0.0)
     for k in range(2000):
-        got = observer.update(Sample(k * T, 0.0, 0.0))
-    assert got == Estimate(0.0, 0.0, 0.0)
+        assert observer.update(Sample(k * T, 0.0, 0.0)) == Estimate(0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("mu0", [0.0, 40.0])
@@ -129,7 +128,7 @@ def test_super_twisting_never_looks_healthy_when_a_number_is_not_finite(field: s
     observer = SuperTwisting(setting())
     for k in range(5):
         observer.update(Sample(k * T, 0.1, 1.0))
-    got = observer.update(Sample(5 * T, 0.1, 1.0)._replace(**{field: bad}))
+    got = observer.update(spoilt(Sample(5 * T, 0.1, 1.0), field, bad))
     assert not any(math.isfinite(value) for value in got)
     again = observer.update(Sample(6 * T, 0.1, 1.0))
     assert all(math.isnan(value) for value in again)
@@ -173,7 +172,9 @@ def test_bandwidth_floor_follows_the_rule_and_its_cap(
     counts: float | None, period: float, expected: float
 ) -> None:
     assert bandwidth_floor(counts, period) == pytest.approx(expected, rel=1e-12, abs=0)
-    assert SuperTwisting(setting(period=period, counts=counts)).mu0 == pytest.approx(expected, rel=1e-12, abs=0)
+    assert SuperTwisting(setting(period=period, counts=counts)).mu0 == pytest.approx(
+        expected, rel=1e-12, abs=0
+    )
 
 
 def test_slope_bound_is_the_papers_only_when_the_encoder_is_ideal() -> None:

@@ -1,0 +1,126 @@
+"""The layout of the dashboard, sent with every recording so that a viewer opens right without a click."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from dcmp_hil.telemetry.titles import title
+
+if TYPE_CHECKING:
+    from dcmp_hil.telemetry.rig_view import RigView
+
+TIMELINE = "loop_time"
+_WINDOW = 10.0  # s on the axis of every plot
+_BEYOND_LIMIT = 1.3  # so that the lines of the limit show
+
+
+def dashboard(rig: RigView) -> rrb.Blueprint:
+    """Lay out the run of a rig: the arm, what it does, what is asked of the motor, and how the loop fares."""
+    left = rrb.Vertical(_pendulum(rig), _parameters(), row_shares=[42, 58])
+    joint = rrb.Vertical(
+        plot("joint/position_rad"), plot("joint/velocity_rad_s"), plot("joint/disturbance_rad_s2")
+    )
+    timing = rrb.Horizontal(_timing(), _histogram(), column_shares=[56, 44])
+    control = rrb.Vertical(plot("control/tracking_error_mrad", legend=False), _voltage(rig), timing)
+    states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
+    right = rrb.Vertical(rrb.Horizontal(joint, control), states, row_shares=[80, 20])
+    return opened(rrb.Horizontal(left, right, column_shares=[22, 78]))
+
+
+def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blueprint:
+    """Show nothing but `content`, and follow the newest data unless all of it is there already."""
+    return rrb.Blueprint(
+        content,
+        rrb.TopPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if follow else "paused"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def plot(
+    path: str,
+    *,
+    window: float | None = _WINDOW,
+    legend: bool = True,
+    reach: float | None = None,
+    name: str = "",
+    contents: str | list[str] = "$origin/**",
+) -> rrb.TimeSeriesView:
+    """Lay out a plot.
+
+    Parameters
+    ----------
+    path
+        The entity.
+    window
+        s shown, up to the time cursor; None for everything.
+    legend
+        False where a single line needs no name.
+    reach
+        Fixed range of the value, either way; None fits it to what is shown.
+    name
+        Title; empty takes it from the path.
+    contents
+        Entities, where it is not the whole of `path`.
+    """
+    return rrb.TimeSeriesView(
+        origin=path,
+        contents=contents,
+        name=name or title(path),
+        axis_y=None if reach is None else rrb.ScalarAxis(range=(-reach, reach)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        time_ranges=None if window is None else [_last(window)],
+    )
+
+
+def _voltage(rig: RigView) -> rrb.TimeSeriesView:
+    limit = rig.voltage_limit
+    return plot("control/voltage_V", reach=None if limit is None else _BEYOND_LIMIT * limit)
+
+
+def _timing() -> rrb.TimeSeriesView:
+    return plot("loop", name="Timing, worst [µs]", contents=["loop/period_us", "loop/lateness_us"])
+
+
+def _last(seconds: float) -> rr.VisibleTimeRange:
+    return rr.VisibleTimeRange(
+        TIMELINE,
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-seconds),
+        end=rr.TimeRangeBoundary.cursor_relative(),
+    )
+
+
+def _pendulum(rig: RigView) -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin="rig",
+        name="Pendulum (true)" if rig.simulated else "Pendulum (measured)",
+        background=rrb.Background(color=(15, 17, 20)),
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=(0.5, 0.25, 3.1), look_target=(0, 0, 0), eye_up=(0, 1, 0)
+        ),
+    )
+
+
+def _parameters() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin="params", name="Parameters")
+
+
+def _histogram() -> rrb.BarChartView:
+    legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=False)
+    return rrb.BarChartView(origin="loop/period_hist", name="All periods [µs]", plot_legend=legend)
+
+
+def _states() -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin="events", name="Phase and states")
+
+
+def _events() -> rrb.TextLogView:
+    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
+    return rrb.TextLogView(origin="events", name="Events", columns=columns)

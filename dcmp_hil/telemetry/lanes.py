@@ -1,0 +1,25 @@
+"""A condition of each period, reduced to the periods in which it changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class Lane:
+    """Remembers the last answer from block to block."""
+
+    def __init__(self) -> None:
+        self._last: bool | None = None
+
+    def changes(self, truth: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Return the rows of `truth`, shape (n,), that differ from the row before; the very first does."""
+        before = np.concatenate((truth[:1] if self._last is None else [self._last], truth[:-1]))
+        changed = truth != before
+        changed[0] |= self._last is None
+        self._last = bool(truth[-1])
+        return np.flatnonzero(changed)

@@ -1,0 +1,165 @@
+"""A picture of a whole run, for where nobody saw it live."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
+from dcmp_hil.telemetry.titles import title
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.signals import Signal
+
+    Columns = dict[str, NDArray[np.float64]]
+
+_MOST_POINTS = 20_000
+_BUCKETS = 4_000  # each keeps its lowest and its highest point
+_PANELS = (
+    "joint/position_rad",
+    "joint/velocity_rad_s",
+    "joint/disturbance_rad_s2",
+    "control/tracking_error_mrad",
+    "control/voltage_V",
+    "loop/lateness_us",
+)  # the first half on the left
+_GREY = "#4a4f57"
+_START = 5.0  # times the largest error of the second half: a start beyond that gets no room
+_CLIPPED = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
+
+
+def draw_run(columns: dict[str, NDArray[np.float64]], title: str, path: Path) -> None:
+    """Draw an overview of a run.
+
+    Parameters
+    ----------
+    columns
+        As `dcmp_hil.telemetry.signals.columns` gives them; those that are missing or all NaN are left out.
+    title
+        Stands above the plots.
+    path
+        The picture; its ending says which format.
+
+    Raises
+    ------
+    ConfigError
+        If matplotlib is missing, or the file cannot be written.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise ConfigError(
+            "Drawing needs matplotlib, which is not installed. Install it: pip install 'dcmp-hil[plot]'."
+        ) from None
+    figure = Figure(figsize=(12.8, 7.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=13, fontweight="bold", x=0.012, ha="left")
+    _draw_panels(figure, columns)
+    try:
+        figure.savefig(path, dpi=150)
+    except (OSError, ValueError) as error:  # ValueError: an ending that is no format
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigError(f"{path}: {reason}. Choose a .png file that you may write.") from None
+
+
+def thinned(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Reduce a long line to the extremes of each stretch of it, so that no peak is lost.
+
+    Parameters
+    ----------
+    time, values
+        Shape (n,).
+
+    Returns
+    -------
+    tuple of ndarray
+        Time and values; as they were up to 20,000 points.
+    """
+    if len(time) <= _MOST_POINTS:
+        return time, values
+    low = np.where(np.isnan(values), np.inf, values)
+    high = np.where(np.isnan(values), -np.inf, values)
+    keep = {0, len(time) - 1}
+    for rows in np.array_split(np.arange(len(time)), _BUCKETS):
+        keep.add(int(rows[np.argmin(low[rows])]))
+        keep.add(int(rows[np.argmax(high[rows])]))
+    chosen = np.array(sorted(keep))
+    return time[chosen], values[chosen]
+
+
+def _draw_panels(figure: Figure, columns: Columns) -> None:
+    rows = len(_PANELS) // 2
+    grid = figure.subplots(rows, 2, sharex=True, squeeze=False)
+    plots = by_plot()
+    for k, name in enumerate(_PANELS):
+        axes = grid[k % rows][k // rows]
+        _draw_panel(axes, columns, plots[name])
+        _dress(axes, name)
+        if name == "control/tracking_error_mrad":
+            _fit_to_second_half(axes)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]", fontsize=9, color=_GREY)
+
+
+def _draw_panel(axes: Axes, columns: Columns, signals: list[Signal]) -> None:
+    for signal in signals:
+        values = columns.get(signal.column)
+        if values is None or np.isnan(values).all():
+            continue
+        t, y = thinned(columns["time_s"], values)
+        axes.plot(
+            t,
+            y,
+            label=signal.label,
+            color=[c / 255 for c in signal.colour],
+            linewidth=_width(signal),
+            drawstyle="steps-post" if signal.plot.endswith("_V") else "default",
+        )
+    if signals[0].plot.endswith("_V"):
+        _fit_to_sent(axes, columns)
+    if len(axes.lines) > 1:
+        axes.legend(loc="upper right", fontsize=8, frameon=True, framealpha=0.85, edgecolor="none", ncols=4)
+
+
+def _width(signal: Signal) -> float:
+    """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
+    return {TRUE: 3.4, ESTIMATE: 2.0}.get(signal.colour, 1.0)
+
+
+def _fit_to_sent(axes: Axes, columns: Columns) -> None:
+    sent = columns.get("voltage_sent_V")
+    if sent is not None and not np.isnan(sent).all():
+        reach = _CLIPPED * float(np.nanmax(np.abs(sent))) or 1.0
+        axes.set_ylim(-reach, reach)
+
+
+def _fit_to_second_half(axes: Axes) -> None:
+    """Leave a start that dwarfs all that follows outside, and say so."""
+    if not axes.lines:
+        return
+    size = np.abs(np.asarray(axes.lines[0].get_ydata(), dtype=np.float64))
+    if np.isnan(size[len(size) // 2 :]).all():
+        return
+    whole, half = float(np.nanmax(size)), float(np.nanmax(size[len(size) // 2 :]))
+    if half > 0.0 and whole > _START * half:
+        axes.set_ylim(-1.5 * half, 1.5 * half)
+        axes.set_title(f"start beyond the scale: {whole:.4g}", loc="right", fontsize=8.5, color=_GREY)
+
+
+def _dress(axes: Axes, name: str) -> None:
+    axes.set_title(title(name), loc="left", fontsize=10, color=_GREY)
+    axes.grid(visible=True, color="#e3e6ea", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.margins(x=0.0, y=0.08)
+    axes.tick_params(labelsize=8.5, colors=_GREY, length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)

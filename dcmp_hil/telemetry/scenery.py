@@ -1,0 +1,145 @@
+"""What a recording shows that does not change: styles of lines, the drawn pendulum, the parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.signals import Signal
+
+ARM, GHOST = "rig/arm", "rig/reference"
+LIMITS = "control/voltage_V/limit"
+PERIODS = "loop/period_hist"
+LANES = {
+    "phase": {"settling": FAINT, "engaging": ESTIMATE, "running": REFERENCE},
+    "voltage": {"within limits": VOLTAGE, "at the limit": ERROR},
+    "samples": {"on time": TIMING, "late": ERROR},
+}
+"""Lanes of the timeline of states, with the colour of each state."""
+
+_WIDTHS = {TRUE: 4.5, ESTIMATE: 2.8, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
+_LENGTH = 1.0
+_FRONT = 0.12  # the arm moves before the dial
+
+
+def lane_path(lane: str) -> str:
+    """Return the entity of a lane."""
+    return f"events/{lane}"
+
+
+def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
+    """Log all that is known before the first period."""
+    _log_parameters(stream, rig)
+    _log_stand(stream)
+    _log_arm(stream)
+    if rig.voltage_limit is not None:
+        style = rr.SeriesLines(names=["limit", "limit"], colors=[(130, 60, 60)] * 2, widths=[1.0] * 2)
+        stream.log(LIMITS, style, static=True)
+    for lane, states in LANES.items():
+        look = rr.StateConfiguration(values=list(states), colors=list(states.values()))
+        stream.log(lane_path(lane), look, static=True)
+
+
+def log_style(stream: rr.RecordingStream, plot: str, signals: Sequence[Signal]) -> None:
+    """Log how the lines of a plot look."""
+    held = plot.endswith("_V")
+    timing = plot.startswith("loop/")
+    style = rr.SeriesLines(
+        names=[signal.label for signal in signals],
+        colors=[signal.colour for signal in signals],
+        widths=[_width(signal) for signal in signals],
+        # The default averages what falls on one pixel, and hides the spikes that matter here.
+        aggregation_policy="Max" if timing else "MinMax",
+        interpolation_mode="StepAfter" if held else "Linear",
+    )
+    stream.log(plot, style, static=True)
+
+
+def _width(signal: Signal) -> float:
+    """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
+    return _WIDTHS.get(signal.colour, 1.2)
+
+
+def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return quaternions, shape (n, 4), about the motor's axis; positive is counter-clockwise."""
+    half, zero = 0.5 * angles, np.zeros_like(angles)
+    return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
+
+
+def _log_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
+    rows = [f"| {name} | {value} |" for name, value in rig.parameters]
+    text = "\n".join([f"| {rig.name} | |", "|:--|:--|", *rows])
+    stream.log("params", rr.TextDocument(text, media_type="text/markdown"), static=True)
+
+
+def _circle(radius: float, z: float) -> NDArray[np.float64]:
+    angles = np.linspace(0.0, 2.0 * np.pi, 97)
+    return np.stack([radius * np.sin(angles), -radius * np.cos(angles), np.full_like(angles, z)], axis=1)
+
+
+def _log_stand(stream: rr.RecordingStream) -> None:
+    motor = rr.Cylinders3D(
+        lengths=[0.3, 0.06],
+        radii=[0.2, 0.24],
+        centers=[(0, 0, -0.12), (0, 0, 0.0)],
+        colors=[(70, 74, 80), (96, 102, 110)],
+        fill_mode="Solid",
+    )
+    stream.log("rig/motor", motor, static=True)
+    ticks = np.radians(np.arange(0, 360, 15))
+    strips = []
+    for k, angle in enumerate(ticks):
+        direction = np.array([np.sin(angle), -np.cos(angle), 0.0])
+        strips.append([direction * (1.18 if k % 6 else 1.14), direction * 1.22])
+    dial = rr.LineStrips3D(
+        [_circle(1.22, 0.0), *strips],
+        colors=[(95, 100, 108)],
+        radii=[0.007, *[0.004 if k % 6 else 0.009 for k in range(len(ticks))]],
+    )
+    stream.log("rig/dial", dial, static=True)
+    names = rr.Points3D(
+        [(0, -1.36, 0), (1.36, 0, 0), (0, 1.36, 0), (-1.36, 0, 0)],
+        labels=["0", "+90°", "180°", "-90°"],
+        show_labels=True,
+        radii=[0.001],
+        colors=[(150, 155, 160)],
+    )
+    stream.log("rig/dial/names", names, static=True)
+
+
+def _log_arm(stream: rr.RecordingStream) -> None:
+    rod = rr.Capsules3D(
+        lengths=[_LENGTH],
+        radii=[0.045],
+        translations=[(0, 0, _FRONT)],
+        rotation_axis_angles=[rr.RotationAxisAngle(axis=(1, 0, 0), degrees=90)],
+        colors=[TRUE],
+        fill_mode="Solid",
+    )
+    stream.log(f"{ARM}/rod", rod, static=True)
+    ends = rr.Ellipsoids3D(
+        half_sizes=[(0.13, 0.13, 0.13), (0.09, 0.09, 0.09)],
+        centers=[(0, -_LENGTH, _FRONT), (0, 0, _FRONT)],
+        colors=[(170, 190, 210), (60, 64, 70)],
+        fill_mode="Solid",
+    )
+    stream.log(f"{ARM}/ends", ends, static=True)
+    outline = rr.LineStrips3D(
+        [
+            [(0, 0, _FRONT), (0, -1.14, _FRONT)],
+            _circle(0.17, 0.0) + np.array([0.0, -_LENGTH, _FRONT]),
+        ],
+        colors=[REFERENCE],
+        radii=[0.010],
+    )
+    stream.log(f"{GHOST}/outline", outline, static=True)

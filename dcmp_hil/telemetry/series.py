@@ -1,0 +1,85 @@
+"""Plots that are already there as columns, written as a recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.blueprint import TIMELINE, opened, plot
+from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, FAINT, REFERENCE, TRUE, VOLTAGE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+_STYLES = {
+    "measured": (TRUE, 4.5),
+    "true": (TRUE, 4.5),
+    "given": (FAINT, 1.0),
+    "estimate": (ESTIMATE, 2.8),
+    "reference": (REFERENCE, 1.2),
+    "error": (ERROR, 1.2),
+    "applied": (VOLTAGE, 1.6),
+}
+_OTHERS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT)
+_FLUSH = 30.0  # s
+
+
+def write_series(
+    path: Path, application: str, time: NDArray[np.float64], plots: dict[str, dict[str, NDArray[np.float64]]]
+) -> None:
+    """Write columns as an .rrd file that opens as one plot above the other.
+
+    Parameters
+    ----------
+    path
+        Written anew.
+    application
+        Recordings of the same application share the viewer's layout.
+    time
+        s, shape (n,).
+    plots
+        Entity path with unit, such as ``joint/position_rad``, to the lines of the plot by name, each of
+        shape (n,). Lines that are all NaN are left out.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be written.
+    """
+    try:
+        path.open("wb").close()
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
+    layout = opened(rrb.Vertical(*(plot(name, window=None) for name in plots)), follow=False)
+    stream = rr.RecordingStream(application)
+    stream.set_sinks(rr.FileSink(path), default_blueprint=layout)
+    stream.send_blueprint(layout)
+    stream.send_recording_name(path.stem)
+    times = [rr.TimeColumn(TIMELINE, duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
+    for name, lines in plots.items():
+        _send(stream, name, times, {k: v for k, v in lines.items() if not np.isnan(v).all()})
+    stream.flush(timeout_sec=_FLUSH)
+    stream.disconnect()
+
+
+def _send(
+    stream: rr.RecordingStream, path: str, times: list[rr.TimeColumn], lines: dict[str, NDArray[np.float64]]
+) -> None:
+    if not lines:
+        return
+    styles = [_STYLES.get(name, (_OTHERS[k % len(_OTHERS)], 1.2)) for k, name in enumerate(lines)]
+    look = rr.SeriesLines(
+        names=list(lines),
+        colors=[colour for colour, _ in styles],
+        widths=[width for _, width in styles],
+        aggregation_policy="MinMax",
+    )
+    stream.log(path, look, static=True)
+    values = np.stack(list(lines.values()), axis=1)
+    stream.send_columns(path, times, rr.Scalars.columns(scalars=values))

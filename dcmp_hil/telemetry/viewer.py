@@ -1,0 +1,108 @@
+"""The native viewer as a process of its own, and the ports of this machine on the way to it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+from importlib.util import find_spec
+from pathlib import Path
+
+from dcmp_hil.clock import MonotonicClock, pause
+
+LOOPBACK = "127.0.0.1"
+PORT = 9876
+_PORTS_TRIED = 50
+_LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
+_CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
+_ESTABLISHED = "01"  # in /proc/net/tcp
+_QUIET = {"CI": "1", "RERUN_ANALYTICS": "0"}  # the viewer phones nobody
+
+
+def proxy_url(port: int) -> str:
+    """Return the address under which a viewer finds a recording served on this machine."""
+    return f"rerun+http://{LOOPBACK}:{port}/proxy"
+
+
+def free_port(first: int = PORT) -> int | None:
+    """Return the first port from `first` on that nobody listens on; None if there is none near."""
+    for port in range(first, first + _PORTS_TRIED):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does
+            try:
+                probe.bind((LOOPBACK, port))
+            except OSError:
+                continue
+            return port
+    return None
+
+
+def answers(port: int, within: float) -> bool:
+    """Tell whether somebody accepts connections on `port` within so many seconds."""
+    clock = MonotonicClock()
+    end_ns = clock.now_ns() + int(within * 1e9)
+    while True:
+        try:
+            socket.create_connection((LOOPBACK, port), timeout=within).close()
+        except OSError:
+            if clock.now_ns() >= end_ns:
+                return False
+            pause(0.02)
+        else:
+            return True
+
+
+def viewer_binary() -> Path:
+    """Return the viewer's own binary: the command `rerun` is a Python process around it."""
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        raise FileNotFoundError("the package rerun_cli is missing: install rerun-sdk again")
+    return Path(package.origin).with_name("rerun")
+
+
+def viewer_environment() -> dict[str, str]:
+    """Return this environment with the viewer's analytics off."""
+    return {**os.environ, **_QUIET}
+
+
+def start_viewer(port: int) -> subprocess.Popen[bytes]:
+    """Open a window on the recording served on `port`; it outlives this process.
+
+    The port must answer already: a viewer that finds nobody does not try again.
+
+    Raises
+    ------
+    OSError
+        If the viewer cannot be started.
+    """
+    options = ["--bind", LOOPBACK, "--memory-limit", "2GB", "--connect", proxy_url(port)]
+    return subprocess.Popen(  # noqa: S603 - the binary of our own dependency
+        [viewer_binary(), *options],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=viewer_environment(),
+        start_new_session=True,  # Ctrl-C ends the run, not the window
+    )
+
+
+def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
+    """Wait until `viewer` has fetched what is served on `port`, for 10 s at most."""
+    clock = MonotonicClock()
+    end_ns = clock.now_ns() + int(_LINGER * 1e9)
+    quiet = 0
+    while quiet < _CAUGHT_UP and clock.now_ns() < end_ns and viewer.poll() is None:
+        unsent = _unsent(port)
+        quiet = quiet + 1 if unsent and not any(unsent) else 0
+        pause(0.1)
+
+
+def _unsent(port: int) -> list[int]:
+    """Return the bytes that wait in each connection to `port`, as the kernel counts them."""
+    lines = Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]
+    connections = [line.split() for line in lines]
+    return [
+        int(queues.partition(":")[0], 16)
+        for _, local, _, state, queues, *_ in connections
+        if state == _ESTABLISHED and int(local.rpartition(":")[2], 16) == port
+    ]

@@ -1,0 +1,136 @@
+"""A recording and a live run in a real viewer, drawn without a display."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from dcmp_hil.clock import pause
+from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
+from tests.telemetry.runs import EVENTS, VIEW, blocks, feed
+from tools.screenshot import APT, headless_viewer, look, screenshot, wait_until_loaded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+_MISSING = not any(folder.is_dir() and any(folder.iterdir()) for folder in _DRIVERS)
+_LOOPBACK = {"0100007F", "00000000000000000000000001000000", "0000000000000000FFFF00000100007F"}
+_VIEWS = {
+    *("Position [rad]", "Velocity [rad/s]", "Disturbance [rad/s²]", "Tracking error [mrad]", "Voltage [V]"),
+    *(
+        "Timing, worst [µs]",
+        "All periods [µs]",
+        "Phase and states",
+        "Events",
+        "Parameters",
+        "Pendulum (true)",
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def _vulkan() -> None:
+    if not (_MISSING or not window.viewer_binary().exists()):
+        return
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"no Vulkan driver, or no viewer: {APT}")
+    pytest.skip(f"no Vulkan driver, or no viewer; {APT}")
+
+
+class OpenWindow:
+    """A window that nobody closes."""
+
+    def poll(self) -> None:
+        """Return nothing: it is still open."""
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[RerunSink]:
+    """Yield a sink that serves a live recording, its window replaced by nothing."""
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setattr(window, "start_viewer", lambda _: OpenWindow())
+    sink = RerunSink(VIEW, None, "spawn", port=23_000)
+    yield sink
+    sink.close()
+
+
+def coloured(picture: Path, colour: tuple[int, int, int]) -> int:
+    """Count the pixels of about that colour."""
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=np.int16)
+    return int((np.abs(pixels - np.array(colour)).max(axis=-1) < 24).sum())
+
+
+def listening(process: int | str) -> set[str]:
+    """Return the local addresses on which a process and its children listen."""
+    root = Path("/proc") / str(process)
+    inodes = set()
+    for handle in (root / "fd").iterdir():
+        try:
+            inodes.add(str(handle.readlink()))
+        except OSError:  # closed meanwhile
+            continue
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path("/proc/net", table).read_text(encoding="ascii").splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and f"socket:[{fields[9]}]" in inodes:
+                found.add(fields[1].partition(":")[0])
+    for children in root.glob("task/*/children"):
+        for child in children.read_text(encoding="ascii").split():
+            found |= listening(child)
+    return found
+
+
+def test_a_recording_opens_right_without_a_click(tmp_path: Path) -> None:
+    feed(RerunSink(VIEW, tmp_path / "run.rrd", "none"), periods=3000)
+    seen = screenshot(tmp_path / "run.rrd", tmp_path / "run.png", at=2.0)
+    assert {view.name for view in seen.state.views if view.visible} >= _VIEWS
+    assert seen.complaints == []
+    (recording,) = [r for r in seen.state.recordings if r.store_id == seen.state.active_recording]
+    assert (recording.current_timeline, recording.current_time) == ("loop_time", 2_000_000_000)
+    for colour in (ESTIMATE, VOLTAGE, ERROR):
+        assert coloured(tmp_path / "run.png", colour) > 100
+
+
+def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunSink, tmp_path: Path) -> None:
+    assert served.warnings == []
+    assert served.port is not None
+    made = blocks(3000)
+    with headless_viewer("--connect", window.proxy_url(served.port)) as viewer:
+        served.event(EVENTS[0])
+        for block in made[:20]:
+            served.block(block)
+        wait_until_loaded(viewer)
+        addresses = listening("self")
+        for block in made[20:]:
+            served.block(block)
+        served.close()  # waits until the viewer has it all
+        reached = _reached(viewer, 2_999_000_000)
+        seen = look(viewer, tmp_path / "live.png")
+    assert reached == 2_999_000_000
+    assert seen.complaints == []
+    assert addresses
+    assert addresses <= _LOOPBACK
+    assert coloured(tmp_path / "live.png", ESTIMATE) > 100
+
+
+def _reached(viewer: Any, wanted: int) -> int:
+    """Follow the viewer's time until it is at `wanted`, ns, for 10 s at most."""
+    now = -1
+    for _ in range(100):
+        state = viewer.get_state()
+        now = max([r.current_time or -1 for r in state.recordings if r.store_id == state.active_recording])
+        if now >= wanted:
+            break
+        pause(0.1)
+    return now

@@ -1,0 +1,206 @@
+"""The dashboard: what arrives in a recording, and what a missing viewer or a full disk costs."""
+
+from __future__ import annotations
+
+import dataclasses
+import socket
+import subprocess
+import sys
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from dcmp_hil.config import load_rig
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.display import display_available
+from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.signals import by_plot
+from dcmp_hil.telemetry.titles import title
+from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, entities, feed, read_back, values
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@pytest.fixture(autouse=True)
+def _strict() -> Iterator[None]:
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture
+def _no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_every_signal_arrives_to_the_bit_and_to_the_nanosecond(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    columns = feed(RerunSink(VIEW, record, "none"))
+    for plot, signals in by_plot().items():
+        expected = np.stack([columns[signal.column] for signal in signals], axis=1)
+        np.testing.assert_array_equal(values(record, plot), expected)
+    table = read_back(record, "joint/position_rad")
+    assert table["tick"] == list(range(1000))
+    assert table["loop_time"] == [timedelta(milliseconds=k) for k in range(1000)]
+
+
+def test_the_reference_shown_is_that_of_the_sample_s_own_instant(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(VIEW, record, "none"))
+    expected = [at(k * T).position for k in range(1000)]
+    assert values(record, "joint/position_rad")[:, 3] == pytest.approx(expected, abs=1e-12)
+
+
+def test_unknown_truth_is_left_out_and_lines_keep_their_names(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(dataclasses.replace(VIEW, simulated=False), record, "none"), known=False)
+    table = read_back(record, "joint/velocity_rad_s")
+    assert table["SeriesLines:names"] == [["estimate", "reference"]]
+    assert values(record, "joint/velocity_rad_s").shape == (1000, 2)
+
+
+def test_an_arm_that_shows_the_true_position_at_50_hz(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(VIEW, record, "none"))
+    table = read_back(record, "rig/arm")
+    assert table["tick"] == list(range(0, 1000, 20))
+    quaternions = np.array(table["Transform3D:quaternion"]).reshape(-1, 4)
+    angles = 2.0 * np.arctan2(quaternions[:, 2], quaternions[:, 3])
+    assert angles == pytest.approx(np.sin(T * np.arange(0, 1000, 20)), abs=1e-6)
+
+
+def test_phases_events_and_states(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    columns = feed(RerunSink(VIEW, record, "none"))
+    phase, log = read_back(record, "events/phase"), read_back(record, "events/log")
+    assert phase["StateChange:state"] == [["settling"], ["engaging"], ["running"]]
+    assert phase["tick"] == [0, 250, 500]
+    assert log["TextLog:text"] == [[event.text] for event in EVENTS[3:]]
+    assert log["TextLog:level"] == [["WARN"], ["INFO"]]
+    voltage = read_back(record, "events/voltage")
+    assert voltage["StateChange:state"] == [["within limits"], ["at the limit"], ["within limits"]]
+    at_limit = np.flatnonzero(columns["voltage_sent_V"] == 10.0)
+    assert voltage["tick"] == [0, at_limit[0], at_limit[-1] + 1]
+    assert read_back(record, "events/samples")["tick"][1:3] == [96, 97]
+
+
+def test_histogram_counts_every_known_period(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(VIEW, record, "none"), periods=2100)
+    table = read_back(record, "loop/period_hist")
+    last: Any = table["BarChart:values"][-1]
+    assert sum(last[0]["buffer"]) == table["tick"][-1]
+    assert len(table["tick"]) == 3
+
+
+def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(VIEW, record, "none"), periods=200)
+    assert {tuple(row) for row in values(record, "control/voltage_V/limit").tolist()} == {(10.0, -10.0)}
+    assert "| controller.kp_1_s2 | 4000 |" in str(read_back(record, "params")["TextDocument:text"])
+    assert {"rig/arm/rod", "rig/reference/outline", "rig/motor", "rig/dial"} <= entities(record)
+
+
+def test_no_limit_no_lines(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    feed(RerunSink(dataclasses.replace(VIEW, voltage_limit=None), record, "none"), periods=200)
+    assert not {"control/voltage_V/limit"} & entities(record)
+
+
+def test_view_of_a_rig_lists_every_key_and_the_gains_first() -> None:
+    view = view_of(load_rig("bench-1khz", []))
+    assert (view.name, view.voltage_limit, view.simulated, view.period) == ("bench-1khz", 10.0, True, 1e-3)
+    assert view.parameters[0][0].startswith("controller.")
+    assert "name" not in dict(view.parameters)
+    assert view_of(load_rig("paper", [])).voltage_limit is None
+
+
+def test_titles_have_units() -> None:
+    assert title("joint/disturbance_rad_s2") == "Disturbance [rad/s²]"
+    assert title("control/torque_N_m") == "Torque [N·m]"
+    assert title("loop/lateness_us") == "Lateness [µs]"
+    assert title("a/plain_name") == "Plain name"
+
+
+def test_unwritable_recording_is_a_config_error_with_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"no/run\.rrd: No such file.* Choose a file"):
+        RerunSink(VIEW, tmp_path / "no" / "run.rrd", "none")
+
+
+@pytest.mark.usefixtures("_no_display")
+def test_spawn_without_a_display_warns_and_goes_on(tmp_path: Path) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "spawn")
+    assert not display_available()
+    assert "no display" in sink.warnings[0]
+    assert sink.port is None
+    feed(sink, periods=100)
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
+
+
+def test_connect_with_nobody_there_warns_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as free:
+        free.bind((window.LOOPBACK, 0))
+        monkeypatch.setattr(window, "PORT", free.getsockname()[1])
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "connect")
+    assert "goes on without one" in sink.warnings[0]
+    feed(sink, periods=100)
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
+
+
+def test_a_busy_port_is_passed_over() -> None:
+    with socket.socket() as busy:
+        busy.bind((window.LOOPBACK, 0))
+        busy.listen()
+        port = busy.getsockname()[1]
+        found = window.free_port(port)
+        assert found is not None
+        assert found > port
+        assert window.answers(port, 0.5)
+
+
+def test_no_free_port_and_a_missing_viewer_are_warnings(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(port: int) -> None:
+        raise FileNotFoundError(f"no viewer for {port}")
+
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setattr(window, "start_viewer", missing)
+    sink = RerunSink(VIEW, None, "spawn", port=24_100)
+    sink.close()
+    assert "The viewer did not start (no viewer for" in sink.warnings[0]
+    monkeypatch.setattr(window, "free_port", lambda _: None)
+    assert "No port from 24100 on is free" in RerunSink(VIEW, None, "spawn", port=24_100).warnings[0]
+
+
+_DISK_FULL = """
+import resource, sys
+from pathlib import Path
+from dcmp_hil.telemetry.rerun_sink import RerunSink
+from tests.telemetry.runs import VIEW, feed
+sink = RerunSink(VIEW, Path(sys.argv[1]), "none")
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+feed(sink, periods=20_000)
+"""
+
+
+def test_a_disk_that_fills_up_never_reaches_the_run(tmp_path: Path) -> None:
+    record = tmp_path / "run.rrd"
+    done = subprocess.run([sys.executable, "-c", _DISK_FULL, str(record)], timeout=60, check=False)
+    assert done.returncode == 0
+    assert 100_000 < record.stat().st_size <= 200_000
+
+
+def test_nothing_follows_from_an_empty_block(tmp_path: Path) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    block = blocks(1)[0]
+    block.rows, block.reference = block.rows[:0], block.reference[:0]
+    sink.block(block)
+    sink.close()
+    assert "joint/position_rad" not in entities(tmp_path / "run.rrd")

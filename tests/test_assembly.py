@@ -1,0 +1,112 @@
+"""From a rig to its stages: classes of one's own, and what is said when they cannot be made."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dcmp_hil import run
+from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.controllers import Setting as ControllerSetting
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.model import Model
+from dcmp_hil.observers import Setting
+from dcmp_hil.observers.known_friction import KnownFriction
+from dcmp_hil.observers.paper import PaperObserver
+from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.references.periodic import Sine
+from dcmp_hil.trajectory import Trajectory
+from tests.helpers import STEADY, bench, figures, known, named
+
+if TYPE_CHECKING:
+    from dcmp_hil.observers import Observer
+    from dcmp_hil.values import Estimate, Reference, Sample
+
+
+class _Mine:
+    """An observer and a controller of somebody's own."""
+
+    def __init__(self, setting: Any, gain: float = 1.0) -> None:
+        self.setting, self.gain = setting, gain
+
+    def update(self, *_: object) -> Any:
+        return 0.0
+
+
+def _observer(*overrides: str) -> Observer:
+    return make_observer(bench(*overrides), Trajectory(Sine(), 2.0))
+
+
+def test_observer_is_the_one_that_the_rig_names() -> None:
+    assert isinstance(_observer(), SuperTwisting)
+    assert isinstance(_observer("observer.kind=paper"), PaperObserver)
+    assert isinstance(_observer("controller.friction_feedforward=true"), KnownFriction)
+
+
+def test_observer_of_ones_own_gets_its_setting_and_its_options() -> None:
+    made = _observer(
+        f"observer.kind={named(_Mine)}", "observer.options.gain=7.0", "model.f0_1_s=0.3", "loop.rate_hz=2000"
+    )
+    assert isinstance(made, _Mine)
+    assert made.gain == 7.0
+    assert made.setting == Setting(Model(f0=0.3), 0.0005, 4096.0)
+
+
+def test_controller_of_ones_own_gets_its_setting_and_its_options() -> None:
+    made = make_controller(bench(f"controller.kind={named(_Mine)}", "controller.options.gain=-1"))
+    assert isinstance(made, _Mine)
+    assert made.gain == -1
+    assert made.setting == ControllerSetting(Model(), 0.001)
+
+
+@pytest.mark.parametrize("stage", ["observer", "controller"])
+def test_stage_of_ones_own_is_explained_when_it_cannot_be_made(stage: str) -> None:
+    rig = bench(f"{stage}.kind={named(_Mine)}", f"{stage}.options.gian=7.0")
+    with pytest.raises(ConfigError, match="gian") as caught:
+        run(rig, duration=1.0, fast=True)
+    assert f"[{stage}.options]" in str(caught.value)
+
+
+@pytest.mark.parametrize("stage", ["observer", "controller", "backend"])
+def test_stage_of_ones_own_is_explained_when_it_is_not_there(stage: str) -> None:
+    rig = bench(f"{stage}.kind=nowhere_to_be_found:Class")
+    with pytest.raises(ConfigError, match=rf"{stage}\.kind.*nowhere_to_be_found"):
+        run(rig, duration=1.0, fast=True)
+
+
+def test_loop_runs_on_an_observer_and_a_controller_of_ones_own() -> None:
+    class Position:
+        def __init__(self, setting: Setting) -> None:
+            self._inner = SuperTwisting(setting)
+
+        def update(self, sample: Sample) -> Estimate:
+            return self._inner.update(sample)
+
+    class Proportional:
+        def __init__(self, setting: ControllerSetting, kp: float, kd: float) -> None:
+            self._ku, self._kp, self._kd = setting.model.ku, kp, kd
+
+        def update(self, reference: Reference, estimate: Estimate) -> float:
+            u = (
+                reference.acceleration
+                + self._kp * (reference.position - estimate.position)
+                + self._kd * (reference.velocity - estimate.velocity)
+                + 0.1 * estimate.velocity
+                - estimate.disturbance
+            )
+            return u / self._ku
+
+    result = run(
+        bench(
+            *STEADY,
+            f"observer.kind={named(Position)}",
+            f"controller.kind={named(Proportional)}",
+            "controller.options={kp=4000.0, kd=130.0}",
+        ),
+        duration=30.13,
+        fast=True,
+        window_from=5.0,
+    )
+    own, shipped = known(result.summary.tracking_rms_rad), known(figures().tracking_rms_rad)
+    assert own == pytest.approx(shipped, rel=0.3)  # the same law: only rounding at each count differs

@@ -1,0 +1,170 @@
+"""One period is one straight line: the order of its stages, and which command acts when."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from dcmp_hil import loop, run
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.errors import TripError
+from dcmp_hil.values import Cycle, Estimate, Reference, Sample
+from tests.helpers import STEADY, T, bench
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class _Stages:
+    """Every stage of the line in one: each call is noted, with what it was given."""
+
+    def __init__(self, clock: SimulatedClock, samples: list[Sample]) -> None:
+        self.calls: list[tuple[str, tuple[Any, ...]]] = []
+        self.clock = clock
+        self.trip: TripError | None = None
+        self.trip_at = 10**9
+        self._samples = iter(samples)
+        self._tick = -1
+
+    def stage(self, names: dict[str, Callable[..., Any]]) -> Any:
+        """Make one stage: its methods, and what they answer."""
+        calls = self.calls
+
+        class Stage:
+            trip = property(lambda _: self.trip)
+
+            def __getattr__(self, name: str) -> Callable[..., Any]:
+                def call(*arguments: Any) -> Any:
+                    calls.append((name, arguments))
+                    return names[name](*arguments)
+
+                return call
+
+        return Stage()
+
+    def read(self) -> Sample:
+        self._tick += 1
+        self.clock.sleep_until_ns(self._tick * 1_000_000)
+        return next(self._samples)
+
+    def admit(self, *_: object) -> float:
+        if self._tick >= self.trip_at:
+            self.trip = TripError("because", "Seen.", "Look.")
+            return 0.0
+        return 6.0
+
+    def line(self) -> loop.Line:
+        """Make the line."""
+        clock = self.clock
+
+        def works(_: object, __: object) -> float:
+            clock.sleep_until_ns(clock.now_ns() + 7_000)  # 7 us of work
+            return 5.0
+
+        return loop.Line(
+            backend=self.stage({"read": self.read, "write": lambda _: None}),
+            observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
+            predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
+            trajectory=self.stage({"at": lambda t: Reference(t, 0.0, 0.0), "begin": lambda _, __: None}),
+            controller=self.stage({"update": works}),
+            supervisor=self.stage({"engages": lambda _: self._tick == 1, "admit": self.admit}),
+            telemetry=self.stage({"record": lambda _: None}),
+            clock=clock,
+            delay=0.001,
+        )
+
+
+class _Stop:
+    requested = False
+
+
+_SAMPLES = [Sample(0.5 + 0.001 * k, 0.25, 1.0 * k) for k in range(10)]
+
+
+def _stages(trip_at: int = 10**9) -> tuple[_Stages, loop.Line]:
+    stages = _Stages(SimulatedClock(), _SAMPLES)
+    stages.trip_at = trip_at
+    return stages, stages.line()
+
+
+def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
+    stages, line = _stages()
+    assert loop.run(line, _SAMPLES[1].t, _Stop()) == _SAMPLES[1].t
+    second = stages.calls[len(stages.calls) // 2 :]  # begin comes in the second period only
+    second = stages.calls[[name for name, _ in stages.calls].index("record") + 1 :]
+    names = [name for name, _ in second]
+    assert names == [
+        "read", "update", "engages", "begin", "ahead", "at", "update", "admit", "write", "sent", "record",
+    ]  # fmt: skip
+    given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
+    sample, estimate = _SAMPLES[1], Estimate(0.25, 0.0, 0.0)
+    reference, ahead = Reference(sample.t + 0.001, 0.0, 0.0), Estimate(2.0, 0.0, 0.0)
+    assert given[1] == (sample,)
+    assert given[3] == (sample.t, 0.25)  # the trajectory starts at this sample, from the estimate
+    assert given[4] == (sample, estimate)
+    assert given[5] == (sample.t + 0.001,)  # when the command takes effect
+    assert given[6] == (reference, ahead)  # the controller sees the state ahead, the monitors the present
+    assert given[7] == (sample, estimate, 5.0)
+    assert given[8] == given[9] == (6.0,)
+    cycle: Cycle = given[10][0]
+    assert cycle[:5] == (sample, estimate, reference, 5.0, 6.0)
+
+
+def test_loop_times_its_periods() -> None:
+    stages, line = _stages()
+    loop.run(line, _SAMPLES[3].t, _Stop())
+    cycles = [arguments[0] for name, arguments in stages.calls if name == "record"]
+    assert np.isnan(cycles[0].timing.period)
+    for cycle in cycles[1:]:
+        assert cycle.timing == pytest.approx((1e-3, 0.0, 7e-6), abs=1e-12)
+
+
+def test_loop_ends_with_the_period_in_which_the_stop_was_asked_for() -> None:
+    stages, line = _stages()
+    stop = _Stop()
+    stop.requested = True
+    assert loop.run(line, 1e9, stop) == _SAMPLES[0].t
+    assert [name for name, _ in stages.calls].count("record") == 1
+
+
+def test_loop_writes_zero_and_records_the_period_before_it_raises_a_trip() -> None:
+    stages, line = _stages(trip_at=2)
+    with pytest.raises(TripError, match="Seen"):
+        loop.run(line, _SAMPLES[2].t, _Stop())  # tripping wins over the end
+    assert [name for name, _ in stages.calls][-3:] == ["write", "sent", "record"]
+    assert stages.calls[-3] == ("write", (0.0,))
+    assert stages.calls[-1][1][0].voltage == 0.0
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_command_acts_after_its_delay_and_never_before(delay: int) -> None:
+    # The command of sample k acts over [k + delay, k + delay + 1): sample k + delay + 1 reports it.
+    columns = run(bench(*STEADY, f"loop.delay_samples={delay}"), duration=0.5, fast=True).columns
+    sent, applied = columns["voltage_sent_V"], columns["voltage_applied_V"]
+    later = delay + 1
+    assert np.abs(np.diff(sent)).min() > 0.0, "every command must be told from its neighbours"
+    assert (applied[later:] == sent[:-later]).all()
+    assert (applied[:later] == 0.0).all()
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_tracking_error_is_taken_at_one_instant(delay: int) -> None:
+    # x(t) - sin(t/2) at the sample's own t; with Cycle.reference it would be off by x_r' T = 0.5 mrad
+    columns = run(
+        bench(*STEADY, "reference.soft_start_s=0.0", f"loop.delay_samples={delay}"), duration=3.0, fast=True
+    ).columns
+    reference = np.sin(0.5 * columns["time_s"])
+    np.testing.assert_allclose(columns["position_reference_rad"], reference, rtol=0, atol=1e-12)
+    expected = 1e3 * (columns["position_true_rad"] - reference)
+    np.testing.assert_allclose(columns["tracking_error_mrad"], expected, rtol=0, atol=1e-9)
+
+
+def test_tracking_error_is_taken_at_one_instant_when_samples_are_lost() -> None:
+    rig = bench(*STEADY, "reference.soft_start_s=0.0", "backend.kind=tests.helpers:LosesSamples")
+    columns = run(rig, duration=3.0, fast=True).columns
+    assert 2700 < len(columns["time_s"]) < 2950  # 5 % of 3000 lost
+    assert np.diff(columns["time_s"]).max() > 1.5 * T
+    reference = np.sin(0.5 * columns["time_s"])
+    np.testing.assert_allclose(columns["position_reference_rad"], reference, rtol=0, atol=1e-12)

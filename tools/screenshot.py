@@ -1,0 +1,149 @@
+"""Picture of a recording: python -m tools.screenshot FILE.rrd OUT.png [--at SECONDS] [--size 1600x900]."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.telemetry.viewer import (
+    LOOPBACK,
+    answers,
+    free_port,
+    proxy_url,
+    viewer_binary,
+    viewer_environment,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rerun.experimental import LogEntry, ViewerClient, ViewerState
+
+APT = "apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1"
+_START = 30.0  # s: the first picture of a software renderer takes a while
+_LOAD = 60.0  # s
+_SETTLE = 0.7  # s after a seek
+_GREETING_GONE = 5.0  # s after the start, the viewer's first notice leaves the picture
+_FIRST_PORT = 21_000
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a viewer says about a recording that it has on the screen."""
+
+    state: ViewerState
+    logs: list[LogEntry]
+
+    @property
+    def complaints(self) -> list[str]:
+        """Whatever a view or the viewer itself did not like."""
+        reports = [f"{v.name}: {r.summary}" for v in self.state.views for r in v.reports]
+        return reports + [f"{e.level} {e.target}: {e.message}" for e in self.logs if _is_complaint(e)]
+
+
+def _is_complaint(entry: LogEntry) -> bool:
+    """Tell what concerns the recording from what concerns a machine without a graphics card."""
+    return entry.level in {"WARN", "ERROR"} and "Software rasterizer" not in entry.message
+
+
+@contextmanager
+def headless_viewer(*sources: str, size: str = "1600x900") -> Iterator[ViewerClient]:
+    """Run a viewer without a window on `sources` (files or addresses), and hand out its remote control."""
+    from rerun.experimental import ViewerClient
+
+    port = free_port(_FIRST_PORT)
+    if port is None:
+        raise OSError(f"no free port from {_FIRST_PORT} on")
+    options = ["--headless", "--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
+    options += ["--window-size", size, "--memory-limit", "1GB"]
+    with subprocess.Popen(  # noqa: S603 - the binary of our own dependency
+        [viewer_binary(), *options, *sources],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=viewer_environment(),
+    ) as process:
+        try:
+            if not answers(port, _START):
+                raise OSError(f"the headless viewer did not start; it needs Vulkan: {APT}")
+            yield ViewerClient.connect(proxy_url(port))
+        finally:
+            process.kill()
+
+
+def wait_until_loaded(viewer: ViewerClient, within: float = _LOAD) -> ViewerState:
+    """Return the viewer's state once a recording is there whole and a view shows it.
+
+    Raises
+    ------
+    OSError
+        If the viewer reports an error.
+    TimeoutError
+        With what the viewer is still loading.
+    """
+    clock = MonotonicClock()
+    end_ns = clock.now_ns() + int(within * 1e9)
+    while True:
+        state = viewer.get_state()
+        shown = [r for r in state.recordings if r.store_id == state.active_recording and r.timelines]
+        if shown and state.views and not state.loading:
+            return state
+        errors = [entry.message for entry in viewer.get_logs() if entry.level == "ERROR"]
+        if errors:
+            raise OSError("the viewer could not show the recording: " + "; ".join(errors))
+        if clock.now_ns() > end_ns:
+            waiting = ", ".join(source.status for source in state.loading) or "nothing"
+            raise TimeoutError(f"no recording on the screen after {within:g} s; still loading: {waiting}")
+        pause(0.1)
+
+
+def look(viewer: ViewerClient, picture: Path, at: float | None = None, settle: float = _SETTLE) -> Seen:
+    """Save a picture of what `viewer` shows, at `at` s of the run or where it stands, and say what it is."""
+    wait_until_loaded(viewer)
+    if at is not None:
+        viewer.set_time("loop_time", duration=at, play_state="paused")
+    pause(settle)
+    viewer.save_screenshot(str(picture.resolve()))
+    return Seen(viewer.get_state(), viewer.get_logs())
+
+
+def screenshot(recording: Path, picture: Path, *, at: float | None = None, size: str = "1600x900") -> Seen:
+    """Draw a recording as the viewer shows it, without a display.
+
+    Parameters
+    ----------
+    recording
+        The .rrd file.
+    picture
+        The .png file.
+    at
+        s of the run; None for where the viewer opens.
+    size
+        Of the window, pixels.
+    """
+    with headless_viewer(str(recording.resolve(strict=True)), size=size) as viewer:
+        return look(viewer, picture, at, _GREETING_GONE)
+
+
+def main() -> int:
+    """Draw one recording; 1 if the viewer complained about it."""
+    parser = argparse.ArgumentParser(prog="python -m tools.screenshot", description=__doc__)
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("picture", type=Path)
+    parser.add_argument("--at", type=float, metavar="SECONDS", help="time of the run")
+    parser.add_argument("--size", default="1600x900", metavar="WxH", help="pixels")
+    args = parser.parse_args()
+    seen = screenshot(args.recording, args.picture, at=args.at, size=args.size)
+    for complaint in seen.complaints:
+        sys.stderr.write(complaint + "\n")
+    return 1 if seen.complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
