@@ -85,7 +85,7 @@ def _voltage(rig: RigView) -> rrb.TimeSeriesView:
 
 
 def _timing() -> rrb.TimeSeriesView:
-    return plot("loop", name="Timing, worst [µs]", contents=["loop/period_us", "loop/lateness_us"])
+    return plot("loop/timing_us", name="Timing, worst [µs]")
 
 
 def _last(seconds: float) -> rr.VisibleTimeRange:

@@ -29,7 +29,7 @@ _PANELS = (
     "joint/disturbance_rad_s2",
     "control/tracking_error_mrad",
     "control/voltage_V",
-    "loop/lateness_us",
+    "loop/timing_us",
 )  # the first half on the left
 _GREY = "#4a4f57"
 _START = 5.0  # times the largest error of the second half: a start beyond that gets no room

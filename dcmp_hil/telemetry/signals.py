@@ -82,9 +82,9 @@ SIGNALS = (
     Signal("voltage_demand_V", "control/voltage_V", "demanded", DEMAND, lambda b: b["voltage_demand"]),
     Signal("voltage_sent_V", "control/voltage_V", "sent", FAINT, lambda b: b["voltage_sent"]),
     Signal("voltage_applied_V", "control/voltage_V", "applied", VOLTAGE, lambda b: b["voltage_applied"]),
-    Signal("period_us", "loop/period_us", "period", TIMING, lambda b: 1e6 * b["period"]),
-    Signal("lateness_us", "loop/lateness_us", "lateness", ERROR, lambda b: 1e6 * b["lateness"]),
-    Signal("compute_us", "loop/lateness_us", "compute", FAINT, lambda b: 1e6 * b["compute"]),
+    Signal("period_us", "loop/timing_us", "period", TIMING, lambda b: 1e6 * b["period"]),
+    Signal("lateness_us", "loop/timing_us", "lateness", ERROR, lambda b: 1e6 * b["lateness"]),
+    Signal("compute_us", "loop/timing_us", "compute", FAINT, lambda b: 1e6 * b["compute"]),
 )
 
 

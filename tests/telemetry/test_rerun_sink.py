@@ -126,7 +126,7 @@ def test_view_of_a_rig_lists_every_key_and_the_gains_first() -> None:
 def test_titles_have_units() -> None:
     assert title("joint/disturbance_rad_s2") == "Disturbance [rad/s²]"
     assert title("control/torque_N_m") == "Torque [N·m]"
-    assert title("loop/lateness_us") == "Lateness [µs]"
+    assert title("loop/timing_us") == "Timing [µs]"
     assert title("a/plain_name") == "Plain name"
 
 
