@@ -28,10 +28,8 @@ def _run(
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Draw `n` periods: columns by field, and the reference."""
     random = np.random.default_rng(seed)
-    columns: dict[str, NDArray[np.float64]] = {}
-    for name in FIELDS:
-        columns[name] = random.normal(size=n)
-    columns["t"] = _T * np.arange(n)
+    columns = {name: random.normal(size=n) for name in FIELDS}
+    columns["t"] = np.asarray(_T * np.arange(n), np.float64)
     columns["period"] = _T * random.lognormal(0.0, 0.3, size=n)
     columns["lateness"] = 4e-4 * random.lognormal(size=n)
     columns["period"][0] = math.nan  # the first has none
