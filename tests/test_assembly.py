@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -20,6 +21,8 @@ from dcmp_hil.trajectory import Trajectory
 from tests.helpers import STEADY, bench, figures, known, named
 
 if TYPE_CHECKING:
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
     from dcmp_hil.observers import Observer
     from dcmp_hil.values import Estimate, Reference, Sample
 
@@ -73,6 +76,44 @@ def test_stage_of_ones_own_is_explained_when_it_is_not_there(stage: str) -> None
     rig = bench(f"{stage}.kind=nowhere_to_be_found:Class")
     with pytest.raises(ConfigError, match=rf"{stage}\.kind.*nowhere_to_be_found"):
         run(rig, duration=1.0, fast=True)
+
+
+@pytest.mark.parametrize("stage", ["observer", "controller"])
+def test_no_thread_is_left_behind_when_a_stage_cannot_be_made(stage: str) -> None:
+    rig = bench(f"{stage}.kind=nowhere_to_be_found:Class")
+    before = set(threading.enumerate())
+    with pytest.raises(ConfigError):
+        run(rig, duration=1.0)  # on the wall's clock telemetry has a thread
+    assert {thread.name for thread in set(threading.enumerate()) - before} == set()
+
+
+class _Device:
+    """What a factory of a real device looks like: it does not say that it is simulated."""
+
+    def __init__(self, rig: Rig, clock: Clock) -> None:
+        raise AssertionError("it must not even be made")
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        ("encoder.counts_per_rev=ideal", "ideal"),
+        ("amplifier.voltage_limit_V=none", "voltage_limit_V"),
+        ("loop.delay_samples=0", "delay_samples"),
+        ("supervisor.monitors=finite", "monitors"),
+        ("supervisor.start=immediate", "start"),
+    ],
+)
+def test_real_device_is_refused_a_rig_for_simulation_only(override: str, says: str) -> None:
+    rig = bench(f"backend.kind={named(_Device)}", override)
+    with pytest.raises(ConfigError, match=r"backend\.kind") as caught:
+        run(rig, duration=1.0)
+    assert says in str(caught.value)
+
+
+def test_real_device_is_refused_virtual_time() -> None:
+    with pytest.raises(ConfigError, match="fast"):
+        run(bench(f"backend.kind={named(_Device)}"), duration=1.0, fast=True)
 
 
 def test_loop_runs_on_an_observer_and_a_controller_of_ones_own() -> None:

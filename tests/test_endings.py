@@ -61,6 +61,19 @@ def test_stop_request_puts_the_handlers_back_when_the_run_raises() -> None:
     assert [signal.getsignal(each) for each in _ALL] == before
 
 
+def test_stop_request_keeps_its_handlers_until_the_outermost_leaves() -> None:
+    # The command line enters it before the session does, so that no signal falls in between.
+    before = signal.getsignal(signal.SIGTERM)
+    stop = StopRequest()
+    with stop:
+        with stop:
+            inner = signal.getsignal(signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) == inner != before
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert stop.signal is signal.SIGTERM
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
 def test_stop_request_leaves_the_handlers_alone_outside_the_main_thread() -> None:
     before = [signal.getsignal(each) for each in _ALL]
     inside: list[object] = []

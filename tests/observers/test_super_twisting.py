@@ -32,6 +32,7 @@ def _off_nominal(periods: float) -> bool:
     return periods == round(periods) or abs(periods - round(periods)) > 0.025
 
 
+@pytest.mark.no_cover
 @settings(deadline=None)
 @given(
     steps=_steps,
