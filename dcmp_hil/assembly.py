@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
@@ -44,7 +44,8 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
     """
     backend = open_backend(rig, clock)
     trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
-    recorder = Recorder(
+    observer, controller = make_observer(rig, trajectory), make_controller(rig)
+    recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,
         Aligner(trajectory.at, rig.delay),
         sinks,
@@ -54,10 +55,10 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
     measured = rig.controller.position == "measured"
     line = Line(
         backend=backend,
-        observer=make_observer(rig, trajectory),
+        observer=observer,
         predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
         trajectory=trajectory,
-        controller=make_controller(rig),
+        controller=controller,
         supervisor=make_supervisor(rig, recorder.event),
         telemetry=recorder,
         clock=clock,
@@ -109,7 +110,7 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
     )
 
 
-def _make_custom(section: Custom, setting: object, key: str):  # type: ignore[no-untyped-def]
+def _make_custom(section: Custom, setting: object, key: str) -> Any:
     make = find_named(section.kind, f"{key}.kind")
     try:
         return make(setting, **section.options)
