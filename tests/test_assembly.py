@@ -91,7 +91,7 @@ class _Device:
     """What a factory of a real device looks like: it does not say that it is simulated."""
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        raise AssertionError("it must not even be made")
+        raise AssertionError(f"{rig.name} on {clock}: it must not even be made")
 
 
 @pytest.mark.parametrize(
@@ -116,6 +116,7 @@ def test_real_device_is_refused_virtual_time() -> None:
         run(bench(f"backend.kind={named(_Device)}"), duration=1.0, fast=True)
 
 
+@pytest.mark.usefixtures("untraced")
 def test_loop_runs_on_an_observer_and_a_controller_of_ones_own() -> None:
     class Position:
         def __init__(self, setting: Setting) -> None:

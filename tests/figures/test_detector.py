@@ -22,7 +22,7 @@ from dcmp_hil.values import Estimate, Sample
 from tests import helpers
 from tests.helpers import STEADY, FaultySim, T, bench, setting
 
-pytestmark = pytest.mark.no_cover  # whole runs: what they run is covered elsewhere, five times slower
+pytestmark = pytest.mark.usefixtures("untraced")
 
 _SEEDS = range(20)
 _ENGAGED = 0.25  # s, when the trajectory starts

@@ -32,8 +32,7 @@ def _off_nominal(periods: float) -> bool:
     return periods == round(periods) or abs(periods - round(periods)) > 0.025
 
 
-@pytest.mark.no_cover
-@settings(deadline=None)
+@settings(deadline=None, max_examples=60)
 @given(
     steps=_steps,
     M=st.sampled_from([0.0, 15.0, 1000.0]),
@@ -58,6 +57,18 @@ def test_super_twisting_equals_matrices_when_steps_and_gaps_vary(
         assert got.position == pytest.approx(expected[0], rel=1e-8, abs=1e-8)
         assert got.velocity == pytest.approx(expected[1], rel=1e-8, abs=1e-5)
         assert got.disturbance == pytest.approx(expected[2], rel=1e-8, abs=1e-2)
+
+
+@pytest.mark.parametrize("M", [15.0, 1000.0])
+@pytest.mark.parametrize("y", [1e-12, 1e-9, 1e-6, 2e-5, 2e-4, 2.4e-4, 1e-3, 1e-2, 0.1])  # rad
+def test_super_twisting_slides_when_the_innovation_is_below_the_floors(y: float, M: float) -> None:
+    # The two meet at b = M / mu0^3: 2.3e-4 rad with M = 15, 1.6e-2 rad with M = 1000, mu0 = 40 rad/s.
+    observer, reference = SuperTwisting(setting(), M=M), MatrixObserver(f0=0.1, M=M, mu0=40.0)
+    observer.update(Sample(0.0, 0.0, 0.0))
+    reference.start(0.0)
+    for k in range(1, 4):
+        got = observer.update(Sample(k * T, k * k * y, 0.0))
+        assert tuple(got) == pytest.approx(reference.step(T, k * k * y, 0.0), rel=1e-7, abs=0)
 
 
 @pytest.mark.parametrize("lost", range(1, 10))
