@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel
 
-from dcmp_hil.config.messages import describe, toml_value
 from dcmp_hil.config.rig import KINDS, Rig
+from dcmp_hil.config.schema import rig_schema
+from dcmp_hil.config.words import describe, toml_value
 
 _ROOT = Path(__file__).parent.parent
 SCHEMA = _ROOT / "dcmp_hil/rigs/rig.schema.json"
@@ -27,12 +27,7 @@ from, with a JSON Schema beside it. A relative `reference.file` starts from the 
 
 def schema_text() -> str:
     """Return the JSON Schema of rig.toml, for editors."""
-    schema: dict[str, Any] = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **Rig.model_json_schema(),
-    }
-    schema["title"] = "dcmp-hil rig.toml"
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(rig_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def page_text() -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.messages import toml_value
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.suggestions import kinds_in_words
+from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
 from dcmp_hil.references.periodic import Chirp, Sine
+from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
 
 _LEAST_DAMPING = 0.5
 _FAR_FROM_RULE = 3.0
+_LOOK_AHEAD = 60.0  # s of a csv reference that are looked at where the run has no end
+_LOOKS = 2000
 
 
 def explain(rig: Rig) -> list[tuple[str, str, str]]:
@@ -35,9 +40,18 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
             continue
         if prefix == "sim.plant." and name not in section.model_fields_set:
             continue  # as in [model]
-        shown = _by_rule(name, rig) if value is None else toml_value(value)
-        rows.append((f"{prefix}{name}", shown, (field.description or "").replace("\n", " ")))
+        meaning = (field.description or _kinds(prefix, name)).replace("\n", " ")
+        if isinstance(value, dict):
+            rows += [(f"{prefix}{name}.{option}", toml_value(of), meaning) for option, of in value.items()]
+            continue
+        rows.append((f"{prefix}{name}", _by_rule(name, rig) if value is None else toml_value(value), meaning))
     return rows
+
+
+def _kinds(prefix: str, name: str) -> str:
+    """Say what else the `kind` of a table may be."""
+    section = prefix.removesuffix(".")
+    return f"Kind: {kinds_in_words(section)}." if name == "kind" and section in KINDS else ""
 
 
 def _by_rule(name: str, rig: Rig) -> str:
@@ -51,8 +65,8 @@ def _by_rule(name: str, rig: Rig) -> str:
 
 def warnings(rig: Rig) -> list[str]:
     """Name what is allowed and yet seldom meant."""
-    found = [_observer(rig), _damping(rig), _start(rig), _reach(rig)]
-    return [sentence for sentence in found if sentence]
+    rules = (_observer, _damping, _monitors, _immediate, _soft_start, _reach)
+    return [sentence for rule in rules if (sentence := rule(rig))]
 
 
 def _observer(rig: Rig) -> str:
@@ -80,14 +94,46 @@ def _damping(rig: Rig) -> str:
     return f"controller: damping kd/(2 sqrt kp) = {zeta:.2f} will ring; kd = 2 sqrt kp gives 1."
 
 
-def _start(rig: Rig) -> str:
+def _monitors(rig: Rig) -> str:
+    if rig.supervisor.monitors == "all" or _is_ideal(rig):
+        return ""
+    return 'supervisor.monitors = "finite": a runaway is not stopped; "all" is what a real rig has.'
+
+
+def _immediate(rig: Rig) -> str:
+    if rig.supervisor.start == "engage" or _is_ideal(rig):
+        return ""
+    return 'supervisor.start = "immediate": no settling and no ramp; "engage" is what a real rig has.'
+
+
+def _is_ideal(rig: Rig) -> bool:
+    """Recognise the paper's simulation, where nothing is between the loop and the plant."""
+    return rig.encoder.counts is None and math.isinf(rig.amplifier.limit)
+
+
+def _soft_start(rig: Rig) -> str:
     if rig.supervisor.start == "engage" and rig.reference.soft_start_s == 0.0:
         return "reference.soft_start_s = 0: the first command is as large as the first error asks for."
     return ""
 
 
 def _reach(rig: Rig) -> str:
-    reference, limit = rig.reference, rig.supervisor.position_limit_rad
-    if isinstance(reference, Sine | Chirp) and abs(reference.offset_rad) + reference.amplitude_rad > limit:
-        return f"reference: it leaves supervisor.position_limit_rad = {limit:g} and will trip."
-    return ""
+    limit = rig.supervisor.position_limit_rad
+    if rig.supervisor.monitors == "finite" or _farthest(rig) <= limit:
+        return ""
+    return f"reference: it leaves supervisor.position_limit_rad = {limit:g} and will trip."
+
+
+def _farthest(rig: Rig) -> float:
+    """Return how far from hanging the reference goes, rad."""
+    reference = rig.reference
+    if isinstance(reference, Sine | Chirp):
+        return abs(reference.offset_rad) + reference.amplitude_rad
+    if isinstance(reference, Hold):
+        return abs(reference.position_rad)
+    if isinstance(reference, Step):
+        return max(abs(reference.before_rad), abs(reference.after_rad))
+    if isinstance(reference, Trapezoid):
+        return max(abs(reference.low_rad), abs(reference.high_rad))
+    length = rig.run.duration_s or _LOOK_AHEAD
+    return max(abs(reference.at(length * k / _LOOKS).position) for k in range(_LOOKS + 1))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from dcmp_hil.backends.kinds import KINDS as BACKENDS
+from dcmp_hil.config.rules import RULES
 from dcmp_hil.config.sections import (
     AmplifierSection,
     BackendSection,
@@ -22,7 +22,7 @@ from dcmp_hil.config.sections import (
 )
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.references.periodic import Chirp, Sine
 from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 from dcmp_hil.references.table import Table
@@ -83,8 +83,8 @@ KINDS: dict[str, dict[str, type[Section]]] = {
 class Rig(Section):
     """Everything about one rig and one way of running it."""
 
-    name: str = Field(default="rig", min_length=1, max_length=60, pattern=r"^[\w.-]+$")
-    """What the run's folder and the dashboard call it."""
+    name: str = Field(default="rig", max_length=60, pattern=r"^\w[\w.-]*$", examples=["my-rig"])
+    """What the run's folder and the dashboard call it: up to 60 letters, digits, and . _ - inside."""
     loop: LoopSection = LoopSection()
     backend: BackendSection = BackendSection()
     encoder: EncoderSection = EncoderSection()
@@ -134,51 +134,7 @@ class Rig(Section):
 
     @model_validator(mode="after")
     def _check_rules(self) -> Rig:
-        faults = [fault for rule in _RULES if (fault := rule(self))]
+        faults = [fault for rule in RULES if (fault := rule(self))]
         if faults:
             raise ValueError("\n".join(faults))
         return self
-
-
-def _step_divides_period(rig: Rig) -> str:
-    if rig.sim.step_us == "auto":
-        return ""
-    steps = rig.period / (rig.sim.step_us * 1e-6)
-    if steps >= 1 - 1e-9 and abs(steps - round(steps)) < 1e-6 * steps:
-        return ""
-    fits = rig.period * 1e6 / max(1, math.ceil(steps - 1e-9))
-    return (
-        f"sim.step_us: got {rig.sim.step_us:g} us, which does not divide the period of "
-        f"{rig.period * 1e6:g} us "
-        f'(loop.rate_hz = {rig.loop.rate_hz:g}). {fits:g} us would, or write "auto".'
-    )
-
-
-def _floor_below_rate(rig: Rig) -> str:
-    mu0 = getattr(rig.observer, "mu0_rad_s", None)
-    if mu0 is None or mu0 * rig.period <= 0.3 + 1e-9:
-        return ""
-    usual = bandwidth_floor(rig.encoder.counts, rig.period)
-    return (
-        f"observer.mu0_rad_s: got {mu0:g} rad/s, too fast for loop.rate_hz = {rig.loop.rate_hz:g}: "
-        f"at most {0.3 / rig.period:g} rad/s. Leave the key out to get {usual:.3g} rad/s, or raise the rate."
-    )
-
-
-def _simulation_only(rig: Rig) -> str:
-    if rig.backend.kind == "sim" or rig.backend.kind not in BACKENDS or not rig.simulation_only:
-        return ""  # a module:Factory says for itself whether it is a simulation, when it is opened
-    return (
-        f'backend.kind: got "{rig.backend.kind}", but {", ".join(rig.simulation_only)} is for simulation '
-        'only. Set backend.kind = "sim", or start from the rig bench-1khz.'
-    )
-
-
-def _known_backend(rig: Rig) -> str:
-    kind = rig.backend.kind
-    if ":" in kind or kind in BACKENDS:
-        return ""
-    return f'backend.kind: got "{kind}"; expected {", ".join(BACKENDS)}, or "module:Factory" of your own.'
-
-
-_RULES = (_known_backend, _step_divides_period, _floor_below_rate, _simulation_only)

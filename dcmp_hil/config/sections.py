@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dcmp_hil.model import Model
-from dcmp_hil.section import NotNegative, Positive, Section
+from dcmp_hil.section import Section
 
 
 class LoopSection(Section):
@@ -16,7 +16,7 @@ class LoopSection(Section):
 
     rate_hz: float = Field(default=1000.0, ge=10.0, le=20_000.0)
     """Samples a second, Hz."""
-    delay_samples: Literal[0, 1] = 1
+    delay_samples: Annotated[int, Field(ge=0, le=1)] = 1  # a Literal would take true and 1.0
     """Periods from a sample to the instant at which its command acts: 1 on every real device."""
 
 
@@ -44,7 +44,7 @@ class AmplifierSection(Section):
 
     voltage_limit_V: Annotated[float, Field(gt=0, le=100)] | Literal["none"] = 10.0
     """Largest voltage either way, V; "none" in simulation only."""
-    slew_V_s: Annotated[float, Field(gt=0)] | Literal["none"] = "none"
+    slew_V_s: Annotated[float, Field(ge=1, le=1e9)] | Literal["none"] = "none"
     """Largest change, V/s; "none" for no limit."""
 
     @property
@@ -73,7 +73,7 @@ class ModelSection(Section):
     """External disturbance eta/J, constant part, rad/s2."""
     eta_amplitude_rad_s2: Annotated[float, Field(ge=-1000, le=1000)] = 0.2
     """External disturbance, swinging part, rad/s2."""
-    eta_rate_rad_s: NotNegative = 0.2
+    eta_rate_rad_s: Annotated[float, Field(ge=0, le=1000)] = 0.2
     """Angular frequency of the swinging part, rad/s."""
 
     def values(self) -> Model:
@@ -100,11 +100,11 @@ class SimSection(Section):
     """Where the arm is at the start, at rest, rad; 0 = hanging."""
     encoder_phase_counts: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Where between two edges the encoder's zero lies, counts."""
-    encoder_noise_counts: NotNegative = 0.0
+    encoder_noise_counts: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Noise before the quantiser, standard deviation, counts (rad with an ideal encoder)."""
-    dead_zone_V: NotNegative = 0.0
+    dead_zone_V: Annotated[float, Field(ge=0, le=100)] = 0.0
     """The amplifier puts out nothing below this, V."""
-    voltage_step_mV: NotNegative = 0.0
+    voltage_step_mV: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Step of the amplifier's output, mV; 0 for none."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all noise: the same seed gives the same run to the bit."""
@@ -119,11 +119,11 @@ class SupervisorSection(Section):
     """`engage`: settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only (simulation only)."""
-    velocity_limit_rad_s: Positive = 20.0
+    velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0
     """Trip above this estimated velocity, rad/s."""
-    position_limit_rad: Positive = 6.2832
+    position_limit_rad: Annotated[float, Field(ge=0.01, le=10_000)] = 6.2832
     """Trip beyond this position either way, rad."""
-    disturbance_limit_rad_s2: Positive = 50.0
+    disturbance_limit_rad_s2: Annotated[float, Field(ge=0.01, le=1e6)] = 50.0
     """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
 
 
@@ -139,7 +139,7 @@ class RunSection(Section):
 class Custom(Section):
     """An observer or a controller of your own: `kind = "module:Class"`, made as Class(setting, **options)."""
 
-    kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
+    kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$", examples=["my_lab.rig:Mine"])]
     """`module:Class`; the module must be importable from where the run is started."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Handed to the class as keyword arguments."""

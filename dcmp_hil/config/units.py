@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 _FAMILIES: tuple[dict[str, float], ...] = (
     {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3},
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    {"hz": 1.0, "khz": 1e3, "Hz": 1.0, "kHz": 1e3},
-    {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
-    {"rad_s": 1.0, "deg_s": 0.017453292519943295, "rpm": 0.10471975511965977},
+    {"hz": 1.0, "khz": 1e3},
+    {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "turns": math.tau, "rev": math.tau},
+    {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": math.pi / 180, "rpm": math.tau / 60, "hz": math.tau},
+    {"rad_s2": 1.0, "deg_s2": math.pi / 180},
     {"V_s": 1.0, "mV_s": 1e-3, "V_ms": 1e3},
+    {"1_s": 1.0},
+    {"1_s2": 1.0},
+    {"rad_s3": 1.0},
+    {"rad_s2_V": 1.0},
+    {"counts": 1.0},
 )
+_UNITS = sorted({unit for family in _FAMILIES for unit in family}, key=len, reverse=True)
+_WORDS = {"rad_s2_V": "(rad/s2)/V", "hz": "Hz", "khz": "kHz"}
+_BY_LOWER = {unit.lower(): unit for unit in _UNITS}
 
 
 def split_unit(key: str) -> tuple[str, str]:
-    """Split a key into stem and unit; the unit is empty if it ends in none that is known."""
-    units = sorted((unit for family in _FAMILIES for unit in family), key=len, reverse=True)
-    for unit in units:
-        if key.endswith(f"_{unit}") and len(key) > len(unit) + 1:
+    """Split a key into stem and unit, however the unit is capitalised; empty if it ends in none known."""
+    for unit in _UNITS:
+        if key.lower().endswith(f"_{unit.lower()}") and len(key) > len(unit) + 1:
             return key[: -len(unit) - 1], unit
     return key, ""
 
@@ -27,3 +37,13 @@ def factor(unit: str, wanted: str) -> float | None:
         if unit in family and wanted in family:
             return family[unit] / family[wanted]
     return None
+
+
+def unit_named(text: str) -> str:
+    """Return the unit that somebody wrote as text, such as "rad/s" or "kHz"; empty if none is known."""
+    return _BY_LOWER.get(text.strip().replace("/", "_").lower(), "")
+
+
+def in_words(unit: str) -> str:
+    """Write a key's unit as people do."""
+    return _WORDS.get(unit) or unit.replace("_", "/")

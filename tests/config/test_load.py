@@ -2,6 +2,7 @@
 
 import copy
 import math
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -117,21 +118,6 @@ def test_load_suggests_name_when_rig_is_unknown() -> None:
     assert 'Did you mean "bench-1khz"?' in fault("bench-1kHz")
 
 
-def test_override_equals_edited_file(tmp_path: Path) -> None:
-    path = file(tmp_path, "[loop]\nrate_hz = 500\n[sim.plant]\nku_rad_s2_V = 6.0\n", "bench-1khz.toml")
-    edited = load_rig(path)
-    overridden = load_rig("bench-1khz", ["loop.rate_hz=500", "sim.plant.ku_rad_s2_V=6.0"])
-    assert edited.model_dump() == overridden.model_dump()
-    assert overridden.plant.ku == 6.0
-    assert overridden.model.values().ku == 5.4
-
-
-def test_override_of_kind_drops_keys_of_old_kind_but_not_given_ones() -> None:
-    assert load_rig("bench-1khz", ["reference.kind=hold"]).reference.kind == "hold"
-    assert load_rig("paper", ["observer.kind=super_twisting"]).observer.kind == "super_twisting"
-    assert "amplitude_rad" in fault("bench-1khz", "reference.kind=hold", "reference.amplitude_rad=1")
-
-
 def test_plant_is_model_where_sim_plant_says_nothing() -> None:
     rig = load_rig("bench-1khz", ["model.gravity_rad_s2=20", "sim.plant.f1_rad_s2=0"])
     assert rig.plant.gravity == 20.0
@@ -167,6 +153,68 @@ def test_copy_writes_a_rig_that_loads_and_its_schema(tmp_path: Path) -> None:
     for target in (tmp_path / "mine.toml", tmp_path / "no/such/place.toml"):
         with pytest.raises(ConfigError, match=target.name):
             copy_rig("bench-1khz", target)
+
+
+def test_copy_refuses_when_target_is_no_place_for_a_rig(tmp_path: Path) -> None:
+    for target, words in (
+        (tmp_path / "mine", "Call it mine.toml"),
+        (tmp_path / "no/such/mine.toml", f"there is no folder {tmp_path / 'no/such'}"),
+        (Path("/proc/mine.toml"), "mine.toml"),
+        (tmp_path / "a\0b.toml", "embedded null byte"),
+    ):
+        with pytest.raises(ConfigError) as caught:
+            copy_rig("bench-1khz", target)
+        assert words in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_copy_leaves_what_is_there_when_file_exists(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("precious")
+    (tmp_path / "rig.schema.json").write_text("mine too")
+    with pytest.raises(ConfigError, match="exists already"):
+        copy_rig("bench-1khz", tmp_path / "mine.toml")
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+    assert copy_rig("paper", tmp_path / "other.toml") == [tmp_path / "other.toml"]
+    assert (tmp_path / "rig.schema.json").read_text() == "mine too"
+
+
+def test_name_starts_with_letter_when_file_stem_does_not(tmp_path: Path) -> None:
+    names = [load_rig(file(tmp_path, "", stem)).name for stem in ("...toml", "--.toml", ".-a b.toml")]
+    assert names == ["rig", "rig", "a-b"]
+
+
+def test_load_names_path_when_it_holds_a_null_byte() -> None:
+    assert fault("a\0b.toml").startswith("a\\u0000b.toml: embedded null byte")
+
+
+def test_load_names_line_when_file_is_no_utf8(tmp_path: Path) -> None:
+    (tmp_path / "latin.toml").write_bytes(b'# one\n# two\nname = "\xe4"\n')
+    assert "latin.toml, line 3: not UTF-8" in fault(str(tmp_path / "latin.toml"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("0,0\n", "at least two rows"),
+        ("0,0\n1,x\n", "row 2"),
+        ("1,0\n0,0\n", "time must rise"),
+        ("0,1e308\n1e-300,-1e308\n1,0\n", "no smooth curve"),
+    ],
+)
+def test_load_names_key_and_file_when_reference_file_is_bad(tmp_path: Path, rows: str, words: str) -> None:
+    (tmp_path / "way.csv").write_text(f"time_s,position_rad\n{rows}")
+    path = file(tmp_path, '[reference]\nkind = "csv"\nfile = "way.csv"\n')
+    text = fault(path)
+    assert text.startswith(f"{path}, reference.file: {tmp_path / 'way.csv'}")
+    assert words in text
+    given = fault("bench-1khz", "reference.kind=csv", f"reference.file={tmp_path / 'way.csv'}")
+    assert given.startswith("--set reference.file: ")
+
+
+def test_load_names_remedy_when_scipy_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.interpolate", None)
+    (tmp_path / "way.csv").write_text("time_s,position_rad\n0,0\n1,1\n")
+    assert "pip install" in fault(file(tmp_path, '[reference]\nkind = "csv"\nfile = "way.csv"\n'))
 
 
 BASES = [tomllib.loads((FOLDER / f"{name}.toml").read_text()) for name in ("bench-1khz", "paper")]
@@ -211,6 +259,7 @@ def test_load_gives_rig_or_config_error_whatever_the_table(case: tuple[dict[str,
     from pydantic import ValidationError
 
     from dcmp_hil.config.messages import explain_faults
+    from dcmp_hil.config.words import dotted
 
     table, touched = case
     try:
@@ -221,4 +270,4 @@ def test_load_gives_rig_or_config_error_whatever_the_table(case: tuple[dict[str,
         for sentence in faults:
             assert sentence.startswith("rig.toml")
             assert "Input should" not in sentence
-            assert any(name in sentence for name in touched), (sentence, touched)
+            assert any(dotted([name]) in sentence for name in touched), (sentence, touched)

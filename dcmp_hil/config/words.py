@@ -1,0 +1,95 @@
+"""Keys, values and what is allowed of them, in words that are safe to print."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_LONGEST = 60  # characters of a key or a value that are shown
+_LARGEST_PLAIN = 1e15  # beyond it a float no longer holds every whole number
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+_TYPES = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}
+
+
+def number(value: float) -> str:
+    """Write a number so that it reads back as the same one."""
+    short = f"{value:g}"
+    if "e" not in short and float(short) == value:
+        return short
+    whole = abs(value) < _LARGEST_PLAIN and value == int(value)
+    return str(int(value)) if whole else repr(value)
+
+
+def toml_value(value: Any) -> str:
+    """Write a value as TOML would, shortened."""
+    if isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, str):
+        text = _quoted(value)
+    elif isinstance(value, dict):
+        text = "a table"
+    elif isinstance(value, list):
+        text = "a list"
+    elif isinstance(value, float):
+        text = number(value)
+    else:
+        text = str(value)
+    return _shortened(text)
+
+
+def dotted(parts: Iterable[str]) -> str:
+    """Write a key in dotted form; what is no bare key is quoted, as TOML wants it."""
+    return ".".join(
+        _shortened(part if re.fullmatch(r"[\w-]+", part) and part.isprintable() else _quoted(part))
+        for part in parts
+    )
+
+
+def describe(schema: Mapping[str, Any]) -> str:
+    """Say in words what a JSON schema of one value allows."""
+    if "anyOf" in schema:
+        return " or ".join(describe(one) for one in schema["anyOf"] if one.get("type") != "null")
+    if "const" in schema:
+        return toml_value(schema["const"])
+    if "enum" in schema:
+        return " or ".join(toml_value(value) for value in schema["enum"])
+    if schema.get("type") == "integer" and (schema.get("minimum"), schema.get("maximum")) == (0, 1):
+        return "0 or 1"
+    examples = schema.get("examples")
+    such_as = f" such as {toml_value(examples[0])}" if examples else ""
+    return f"{_TYPES.get(str(schema.get('type')), 'a table')}{_bounds(schema)}{such_as}"
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    words = {
+        "minimum": "at least",
+        "exclusiveMinimum": "above",
+        "maximum": "at most",
+        "exclusiveMaximum": "below",
+    }
+    parts = [f"{word} {number(schema[bound])}" for bound, word in words.items() if bound in schema]
+    return f", {' and '.join(parts)}" if parts else ""
+
+
+def printable(text: str) -> str:
+    """Escape whatever a terminal would obey instead of showing."""
+    return "".join(_visible(char) for char in text)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def _quoted(text: str) -> str:
+    """Quote text as TOML does."""
+    return '"' + "".join(_ESCAPES.get(char) or _visible(char) for char in text) + '"'
+
+
+def _visible(char: str) -> str:
+    if char.isprintable():
+        return char
+    code = ord(char)
+    return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"  # noqa: PLR2004 - what \u can write
