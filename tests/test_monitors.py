@@ -99,9 +99,10 @@ def test_disturbance_watch_forgives_a_short_peak() -> None:
         assert _reason(watch) == ""
     observer.w = -1000.0  # pulls the mean below the limit in one period
     assert _reason(watch) == ""
+    # It is at -1000 + 1063.2 exp(-0.1) = -38 now, and 100 - 138 exp(-k/10) passes 50 with k = 11: the four
+    # periods of before must not count, so k = 15 is the fifth.
     observer.w = 100.0
-    for _ in range(5):
-        assert _reason(watch) == ""
+    assert [_reason(watch) for _ in range(15)] == [""] * 14 + ["disturbance"]
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)

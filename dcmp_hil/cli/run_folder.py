@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +73,7 @@ class RunFolder:
         console.note(f"kept in {self.path}/")
         recording = record or self.recording
         if not live and recording.exists():
-            console.note(f"no viewer was open; to see the run: rerun {recording}")
+            console.note(f"no viewer was open; to see the run: {_viewer_command()} {recording}")
         picture = self.path / "run.png"
         if picture.exists():
             console.note(f"or look at {picture}")
@@ -98,3 +100,12 @@ class RunFolder:
             )
             for c in trip.cycles:
                 writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing])
+
+
+def _viewer_command() -> str:
+    """Say how to call the viewer: it is installed beside this Python, which need not be on the path."""
+    beside = Path(sys.executable).with_name("rerun")
+    if shutil.which("rerun") or not beside.exists():
+        return "rerun"
+    here = Path.cwd()
+    return str(beside.relative_to(here) if beside.is_relative_to(here) else beside)

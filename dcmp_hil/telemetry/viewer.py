@@ -15,7 +15,10 @@ PORT = 9876
 _PORTS_TRIED = 50
 _LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
-_ESTABLISHED = "01"  # in /proc/net/tcp
+_CONNECTIONS = Path("/proc/net/tcp")
+_ESTABLISHED = "01"  # in there
+_HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))  # with empty settings
+_SETTINGS = 4  # type of the frame that every HTTP/2 server answers with
 _QUIET = {"CI": "1", "RERUN_ANALYTICS": "0"}  # the viewer phones nobody
 
 
@@ -50,6 +53,17 @@ def answers(port: int, within: float) -> bool:
             pause(0.02)
         else:
             return True
+
+
+def speaks_http2(port: int, within: float) -> bool:
+    """Tell whether a server answers on `port`, as a viewer does; one that is frozen only accepts."""
+    try:
+        with socket.create_connection((LOOPBACK, port), timeout=within) as connection:
+            connection.sendall(_HELLO)
+            header = connection.recv(9)
+    except OSError:
+        return False
+    return len(header) > 3 and header[3] == _SETTINGS
 
 
 def viewer_binary() -> Path:
@@ -88,6 +102,8 @@ def start_viewer(port: int) -> subprocess.Popen[bytes]:
 
 def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
     """Wait until `viewer` has fetched what is served on `port`, for 10 s at most."""
+    if not _CONNECTIONS.exists():  # not Linux: nobody can tell
+        return
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_LINGER * 1e9)
     quiet = 0
@@ -99,7 +115,7 @@ def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
 
 def _unsent(port: int) -> list[int]:
     """Return the bytes that wait in each connection to `port`, as the kernel counts them."""
-    lines = Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]
+    lines = _CONNECTIONS.read_text(encoding="ascii").splitlines()[1:]
     connections = [line.split() for line in lines]
     return [
         int(queues.partition(":")[0], 16)
