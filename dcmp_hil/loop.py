@@ -88,6 +88,9 @@ def run(line: Line, until: float, stop: Stop) -> float:
         sample = backend.read()
         arrived = clock.now_ns() * 1e-9
         estimate = observer.update(sample)
+        if first != first:
+            first = arrived - sample.t
+            trajectory.hold(estimate.position)
         if supervisor.engages(sample):
             trajectory.begin(sample.t, estimate.position)
         ahead = predictor.ahead(sample, estimate)
@@ -96,8 +99,6 @@ def run(line: Line, until: float, stop: Stop) -> float:
         voltage = supervisor.admit(sample, estimate, demand)
         backend.write(voltage)
         predictor.sent(voltage)
-        if first != first:
-            first = arrived - sample.t
         timing = Timing(arrived - previous, arrived - first - sample.t, clock.now_ns() * 1e-9 - arrived)
         telemetry.record(Cycle(sample, estimate, reference, demand, voltage, timing))
         previous = arrived

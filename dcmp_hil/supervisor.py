@@ -115,7 +115,11 @@ class Supervisor:
 
 
 def _check_finite(sample: Sample, demand: float) -> None:
-    if not -math.inf < demand < math.inf:
+    try:
+        finite = -math.inf < demand < math.inf
+    except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
+        raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
+    if not finite:
         raise TripError(
             "not_finite",
             f"The controller asked for {demand} V at t = {sample.t:.3f} s.",

@@ -32,6 +32,10 @@ class Trajectory:
         self._begun = False
         self._way_down: _WayDown | None = None
 
+    def hold(self, position: float) -> None:
+        """Stay at `position` (rad) until the trajectory begins."""
+        self._x0 = position
+
     def begin(self, t: float, position: float) -> None:
         """Start the trajectory's clock at device time `t`, from `position` (rad)."""
         self._t0, self._x0, self._begun = t, position, True

@@ -67,7 +67,9 @@ class _Stages:
             backend=self.stage({"read": self.read, "write": lambda _: None}),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
             predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
-            trajectory=self.stage({"at": lambda t: Reference(t, 0.0, 0.0), "begin": lambda _, __: None}),
+            trajectory=self.stage(
+                {"at": lambda t: Reference(t, 0.0, 0.0), "hold": lambda _: None, "begin": lambda _, __: None}
+            ),
             controller=self.stage({"update": works}),
             supervisor=self.stage({"engages": lambda _: self._tick == 1, "admit": self.admit}),
             telemetry=self.stage({"record": lambda _: None}),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from dcmp_hil import run
+from dcmp_hil import load_rig, run
 from dcmp_hil.errors import ConfigError, LinkError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.values import Estimate, Reference, Sample
@@ -447,3 +447,9 @@ def test_run_goes_on_when_a_sink_raises(duration: float, fails_at: int) -> None:
     warnings = [event.text for event in result.events if event.level == "WARN"]
     assert len(warnings) == 1
     assert "disk full" in warnings[0]
+
+
+def test_reference_is_where_the_arm_is_when_it_settles() -> None:
+    columns = run(load_rig("bench-1khz", ["sim.position_rad=0.1"]), duration=0.2, fast=True).columns
+    assert columns["position_reference_rad"] == pytest.approx(columns["position_reference_rad"][0])
+    assert columns["position_reference_rad"][0] == pytest.approx(0.1, abs=1e-3)

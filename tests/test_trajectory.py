@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.references.periodic import Sine
 from dcmp_hil.trajectory import LOWERING, Trajectory
+from dcmp_hil.values import Reference
 from tests.helpers import figures, known
 
 _H = 1e-5  # s
@@ -98,3 +99,11 @@ def test_lowering_does_not_jump_in_velocity_when_the_arm_moves() -> None:
     before = trajectory.at(start - 1e-9)
     trajectory.lower(start)
     assert trajectory.at(start + 1e-9).velocity == pytest.approx(before.velocity, abs=1e-6)
+
+
+def test_trajectory_stays_where_it_is_held_until_it_begins() -> None:
+    trajectory = Trajectory(Sine(), 2.0)
+    trajectory.hold(0.3)
+    assert trajectory.at(7.0) == Reference(0.3, 0.0, 0.0)
+    trajectory.begin(7.0, 0.4)
+    assert trajectory.at(7.0).position == pytest.approx(0.4)
