@@ -47,7 +47,7 @@ def reproduction_table(reproduction: Reproduction) -> Table:
     """Lay out what the paper claims, what its equations give, printed and corrected, and the verdict."""
     start, stop = reproduction.corrected.summary.window_s
     table = _table(f"The paper, reproduced: errors and peak from {start:g} to {stop:g} s")
-    table.caption = "claimed errors are orders of magnitude"
+    table.caption = "claimed: errors are orders of magnitude, the time is an upper bound"
     table.add_column("quantity", no_wrap=True)
     table.add_column("unit", style="dim", no_wrap=True)
     for heading in ("claimed", "printed\n(9)", "printed\n(10)", "corrected", "tolerance"):

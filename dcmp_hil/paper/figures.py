@@ -136,7 +136,6 @@ def _save(figure: Figure, path: Path) -> Path:
         figure.savefig(path)
     except OSError as error:
         raise ConfigError(
-            f"{path}: {error.strerror or error}. "
-            "Choose a folder you may write with --out, or use --no-figures."
+            f"{path}: {error.strerror or error}. Choose another folder with --out, or use --no-figures."
         ) from None
     return path

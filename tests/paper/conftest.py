@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from dcmp_hil.paper import Reproduction, reproduce
+from dcmp_hil.session import Session
 from tests.cli.conftest import cli
 
 __all__ = ["cli"]
 
+_run = Session.run
+
+
+def _run_untraced(session: Session) -> None:
+    """Run without coverage's tracer, as the fixture `untraced` does; what judges the run stays traced."""
+    tracer = sys.gettrace()
+    sys.settrace(None)
+    try:
+        _run(session)
+    finally:
+        sys.settrace(tracer)
+
 
 @pytest.fixture(scope="session")
 def reproduction() -> Reproduction:
-    return reproduce()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Session, "run", _run_untraced)
+        return reproduce()

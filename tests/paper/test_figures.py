@@ -64,6 +64,13 @@ def test_draw_says_so_when_the_folder_is_a_file(reproduction: Reproduction, tmp_
     assert str(blocked) in str(caught.value)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_draw_says_so_when_the_disk_is_full(reproduction: Reproduction, tmp_path: Path) -> None:
+    (tmp_path / "figure-1-state.png").symlink_to("/dev/full")
+    with pytest.raises(ConfigError, match=r"No space left on device\. Choose another folder with --out"):
+        draw(reproduction, tmp_path)
+
+
 def test_draw_names_the_extra_when_matplotlib_is_missing(
     reproduction: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
