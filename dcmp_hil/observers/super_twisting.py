@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.observers.matched import Copy, Gains, luenberger_copy, matched_gains
+from dcmp_hil.observers.matched import Gains, luenberger_copy, matched_gains
 from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
 _SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that
 _NOTHING = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
+
+
+_Step = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
 
 
 class SuperTwistingSettings(Section):
@@ -122,7 +125,7 @@ class SuperTwisting:
         step = self._nominal if abs(dt - self._period) < self._tolerance else self._step(dt)
         if step is None:
             return self._restart(t, y)
-        (f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12), gains = step
+        f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12, k1, k2, k3 = step
         u, y0 = self._ku * voltage, self._y
         z1, z2 = self._z1, self._z2
         self._z1 = f11 * z1 + f12 * z2 + gu1 * u + h01 * y0 + h11 * y
@@ -131,7 +134,8 @@ class SuperTwisting:
         v2 = self._v2 + dt * v3
         v1 = self._v1 + dt * (self._v2 + 0.5 * dt * v3)
         b = y - self._z1 - v1
-        k1, k2, k3 = gains if abs(b) >= self._floor_from else self._sliding_gains(b, dt)
+        if not abs(b) >= self._floor_from:
+            k1, k2, k3 = self._sliding_gains(b, dt)
         self._v1 = v1 = v1 + k1 * b
         self._v2 = v2 = v2 + k2 * b
         self._v3 = v3 = v3 + k3 * b
@@ -145,11 +149,12 @@ class SuperTwisting:
         self._v1 = self._v2 = self._v3 = 0.0
         return Estimate(y, 0.0, 0.0)
 
-    def _solve(self, dt: float) -> tuple[Copy, Gains]:
-        """Everything that depends on the step alone."""
-        return luenberger_copy(dt, self._f0, self._L1, self._L2), _per_step(matched_gains(self.mu0 * dt), dt)
+    def _solve(self, dt: float) -> _Step:
+        """Everything that depends on the step alone, flat: unpacked once a period."""
+        copy = luenberger_copy(dt, self._f0, self._L1, self._L2)
+        return (*copy, *_per_step(matched_gains(self.mu0 * dt), dt))
 
-    def _step(self, dt: float) -> tuple[Copy, Gains] | None:
+    def _step(self, dt: float) -> _Step | None:
         """Find the coefficients of a step that is not one period; None where nothing can be continued."""
         if dt <= 0.0:
             raise ProtocolError(
