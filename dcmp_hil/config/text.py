@@ -58,7 +58,7 @@ def _explained(fault: str, text: str) -> str:
         return f"{fault}. {_remedy('')}"
     line = lines[int(found[1]) - 1].strip()
     shown = printable(line[:_LONGEST_LINE])
-    return f"{fault}: {shown}\n  {_remedy(line)}" if line else f"{fault}. {_remedy('')}"
+    return f"{fault}: `{shown}`. {_remedy(line)}" if line else f"{fault}. {_remedy('')}"
 
 
 def _remedy(line: str) -> str:

@@ -27,7 +27,7 @@ def dashboard(rig: RigView) -> rrb.Blueprint:
     control = rrb.Vertical(plot("control/tracking_error_mrad", legend=False), _voltage(rig), timing)
     states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
     right = rrb.Vertical(rrb.Horizontal(joint, control), states, row_shares=[80, 20])
-    return opened(rrb.Horizontal(left, right, column_shares=[22, 78]))
+    return opened(rrb.Horizontal(left, right, column_shares=[24, 76]))
 
 
 def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blueprint:

@@ -127,12 +127,21 @@ def _draw_panel(axes: Axes, columns: Columns, signals: list[Signal]) -> None:
     if signals[0].plot.endswith("_V"):
         _fit_to_sent(axes, columns)
     if len(axes.lines) > 1:
-        axes.legend(loc="upper right", fontsize=8, frameon=True, framealpha=0.85, edgecolor="none", ncols=4)
+        # Above the lines, level with the title: inside, it would hide some of them.
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.15,
+            fontsize=8,
+            frameon=False,
+            ncols=4,
+            handlelength=1.6,
+        )
 
 
 def _width(signal: Signal) -> float:
     """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
-    return {TRUE: 3.4, ESTIMATE: 2.0}.get(signal.colour, 1.0)
+    return {TRUE: 3.6, ESTIMATE: 2.2}.get(signal.colour, 1.0)
 
 
 def _fit_to_sent(axes: Axes, columns: Columns) -> None:

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 _PROBE = 0.4  # s
 _SERVER_START = 3.0  # s
-_CLOSING = 12.0  # s; a run in real time waits for 2 s only
+_CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
+_FAREWELL = 4.0  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
 
@@ -84,7 +85,6 @@ class RerunSink:
         self._rig = rig
         self._frames = Frames(rig)
         self._outlets: list[Outlet] = []
-        self._given_up: list[Outlet] = []
         self._application, self._recording = application, str(uuid4())
         rr.unregister_shutdown()
         if record is not None:
@@ -109,21 +109,17 @@ class RerunSink:
         self._tell(partial(_send, [self._frames.of_event(event)]), event.t)
 
     def close(self) -> None:
-        """Write what is left; gives up on a viewer that no longer takes anything, after 12 s at most."""
-        atexit.unregister(self.close)
+        """Write what is left, and give up after 12 s at most; a second call waits for the first."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(_CLOSING * 1e9)
-        while self._outlets:
-            if self._outlets[0].close(max(0, end_ns - clock.now_ns()) * 1e-9):
-                self._outlets.pop(0)
-            else:
-                self._given_up.append(self._outlets.pop(0))
+        for outlet in self._outlets:
+            outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
+        atexit.unregister(self.close)
 
     def _tell(self, job: Job, t: float = 0.0) -> None:
         for outlet in tuple(self._outlets):
             if not outlet.do(job):
                 self._outlets.remove(outlet)
-                self._given_up.append(outlet)
                 self._warn_of_a_stuck_outlet(t)
 
     def _warn_of_a_stuck_outlet(self, t: float) -> None:
@@ -150,20 +146,20 @@ class RerunSink:
             _begin(rr.FileSink(record), self._rig, stream)
         except RuntimeError as error:  # a file that can be opened, on a disk that is full
             raise ConfigError(f"The recording cannot begin: {error}. Free some space.") from None
-        self._outlets.append(Outlet(stream, _FILE_PATIENCE))
+        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING))
 
-    def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink) -> Outlet:
-        outlet = Outlet(self._stream(), _VIEWER_PATIENCE)
+    def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> Outlet:
+        outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
         outlet.do(partial(_begin, target, self._rig))
         self._outlets.append(outlet)
         return outlet
 
     def _connect(self) -> None:
         if window.speaks_http2(window.PORT, _PROBE):
-            self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)))
+            self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)), _FAREWELL)
             return
         self.warnings.append(
-            f"No viewer listens on 127.0.0.1:{window.PORT}; the run goes on without one. "
+            f"No viewer answers on 127.0.0.1:{window.PORT}; the run goes on without one. "
             "Start it first with: rerun --bind 127.0.0.1"
         )
 
@@ -182,7 +178,7 @@ class RerunSink:
             )
             return
         target = rr.GrpcServerSink(window.LOOPBACK, self.port, server_memory_limit="256MiB")
-        self._open_window(self._open_viewer(target), self.port)
+        self._open_window(self._open_viewer(target, _CLOSING), self.port)
 
     def _open_window(self, outlet: Outlet, port: int) -> None:
         """Open it on what is known before the first period."""

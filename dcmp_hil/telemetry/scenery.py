@@ -27,7 +27,7 @@ LANES = {
 }
 """Lanes of the timeline of states, with the colour of each state."""
 
-_WIDTHS = {TRUE: 4.5, ESTIMATE: 2.8, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
+_WIDTHS = {TRUE: 5.0, ESTIMATE: 3.2, REFERENCE: 1.6, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
 _LENGTH = 1.0
 _FRONT = 0.12  # the arm moves before the dial
 
@@ -71,7 +71,13 @@ def _width(signal: Signal) -> float:
 
 
 def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return quaternions, shape (n, 4), about the motor's axis; positive is counter-clockwise."""
+    """Return quaternions, shape (n, 4), about the motor's axis: 0 hangs down, positive is counter-clockwise.
+
+    Parameters
+    ----------
+    angles
+        rad, shape (n,).
+    """
     half, zero = 0.5 * angles, np.zeros_like(angles)
     return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
 

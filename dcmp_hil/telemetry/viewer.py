@@ -18,7 +18,7 @@ _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
 _ESTABLISHED = "01"  # in there
 _HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))  # with empty settings
-_SETTINGS = 4  # type of the frame that every HTTP/2 server answers with
+_SETTINGS = b"\x04"  # type of the frame that every HTTP/2 server answers with
 _QUIET = {"CI": "1", "RERUN_ANALYTICS": "0"}  # the viewer phones nobody
 
 
@@ -63,7 +63,7 @@ def speaks_http2(port: int, within: float) -> bool:
             header = connection.recv(9)
     except OSError:
         return False
-    return len(header) > 3 and header[3] == _SETTINGS
+    return header[3:4] == _SETTINGS
 
 
 def viewer_binary() -> Path:

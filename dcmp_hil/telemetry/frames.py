@@ -1,0 +1,125 @@
+"""From blocks and events to what Rerun is sent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from dcmp_hil.telemetry.histogram import PeriodHistogram
+from dcmp_hil.telemetry.lanes import Lane
+from dcmp_hil.telemetry.scenery import ARM, GHOST, LIMITS, PERIODS, lane_path, turned
+from dcmp_hil.telemetry.signals import TIMING, by_plot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.signals import Signal
+    from dcmp_hil.values import Event
+
+    Call = tuple[str, list[rr.TimeColumn], rr.ComponentColumnList]
+
+_POSES_PER_SECOND = 50
+_LATE = 0.5  # of a period
+
+
+class Frames:
+    """Turns a run into calls of `send_columns`: entity, times and columns.
+
+    Parameters
+    ----------
+    rig
+        Its limit and its period are used.
+
+    Attributes
+    ----------
+    plots
+        Entity to the signals drawn there, known with the first block.
+    """
+
+    def __init__(self, rig: RigView) -> None:
+        self.plots: dict[str, list[Signal]] = {}
+        self._rig = rig
+        self._histogram = PeriodHistogram(rig.period)
+        self._lanes = {name: Lane() for name in ("voltage", "samples")}
+        self._last_slot = -1
+
+    def choose_lines(self, block: Block) -> None:
+        """Leave out the truth where nobody knows it, before the first line is drawn."""
+        # By the position: even a simulation knows no disturbance before its first step.
+        known = not np.isnan(block["position_true"]).all()
+        for plot, signals in by_plot().items():
+            drawn = [signal for signal in signals if known or "_true_" not in signal.column]
+            if drawn:
+                self.plots[plot] = drawn
+
+    def of_block(self, block: Block) -> list[Call]:
+        """Return the calls for consecutive periods, at least one."""
+        calls = [*self._lines(block), *self._slow(block), *self._states(block)]
+        if self._histogram.add(block["t"], block["period"]):
+            calls.append(self._bars(block["t"][-1:]))
+        return calls
+
+    def of_event(self, event: Event) -> Call:
+        """Return the call for an event."""
+        t = np.array([event.t])
+        if event.level == "PHASE":
+            return self._state("phase", t, [event.text])
+        return "events/log", self._times(t), rr.TextLog.columns(text=[event.text], level=[event.level])
+
+    def _lines(self, block: Block) -> Iterator[Call]:
+        times = self._times(block["t"])
+        for plot, signals in self.plots.items():
+            values = np.stack([signal.read(block) for signal in signals], axis=1)
+            yield plot, times, rr.Scalars.columns(scalars=values)
+
+    def _slow(self, block: Block) -> Iterator[Call]:
+        """Yield what 50 points a second are enough for: the pendulum, and the lines of the limit."""
+        slots = np.floor(block["t"] * _POSES_PER_SECOND + 1e-6).astype(np.int64)
+        rows = np.flatnonzero(np.diff(slots, prepend=self._last_slot))
+        self._last_slot = int(slots[-1])
+        if not len(rows):
+            return
+        times = self._times(block["t"][rows])
+        true = block["position_true"]
+        position = np.where(np.isnan(true), block["position"], true)
+        for path, angles in ((ARM, position), (GHOST, block.reference[:, 0])):
+            yield path, times, rr.Transform3D.columns(quaternion=turned(angles[rows]))
+        limit = self._rig.voltage_limit
+        if limit is not None:
+            yield LIMITS, times, rr.Scalars.columns(scalars=np.tile([limit, -limit], (len(rows), 1)))
+
+    def _states(self, block: Block) -> Iterator[Call]:
+        limit = self._rig.voltage_limit
+        questions = {"samples": (block["lateness"] > _LATE * self._rig.period, ("on time", "late"))}
+        if limit is not None:
+            at_limit = np.abs(block["voltage_sent"]) >= limit * (1.0 - 1e-9)
+            questions["voltage"] = (at_limit, ("within limits", "at the limit"))
+        for lane, (truth, names) in questions.items():
+            rows = self._lanes[lane].changes(truth)
+            if len(rows):
+                yield self._state(lane, block["t"][rows], [names[int(truth[row])] for row in rows])
+
+    def _state(self, lane: str, t: NDArray[np.float64], states: list[str]) -> Call:
+        return lane_path(lane), self._times(t), rr.StateChange.columns(state=states)
+
+    def _bars(self, t: NDArray[np.float64]) -> Call:
+        shown = self._histogram
+        bars = rr.BarChart.columns(
+            values=[shown.counts.copy()],
+            abscissa=[shown.centres_us],
+            widths=[shown.widths_us],
+            color=[TIMING],
+        )
+        return PERIODS, self._times(t), bars
+
+    def _times(self, t: NDArray[np.float64]) -> list[rr.TimeColumn]:
+        # Rounded: what Rerun makes of float seconds itself is cut off, and one nanosecond short.
+        durations = np.rint(t * 1e9).astype("timedelta64[ns]")
+        ticks = np.rint(t / self._rig.period).astype(np.int64)
+        return [rr.TimeColumn("loop_time", duration=durations), rr.TimeColumn("tick", sequence=ticks)]
