@@ -2,6 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
+from dcmp_hil.errors import ProtocolError
 from dcmp_hil.model import Model
 from dcmp_hil.values import Estimate, Sample
 
@@ -32,4 +33,12 @@ class Setting(NamedTuple):
     counts_per_rev: float | None
 
 
-__all__ = ["Observer", "Setting"]
+def standing_still(before: float, t: float) -> ProtocolError:
+    """Return the error for a sample at `t` that does not come after the one at `before`, both in s."""
+    return ProtocolError(
+        f"The sample at t = {t:.6f} s does not come after the one at {before:.6f} s. "
+        "Check the device's clock, or the time column of the recording."
+    )
+
+
+__all__ = ["Observer", "Setting", "standing_still"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal
 
-from dcmp_hil.errors import ProtocolError
+from dcmp_hil.observers import standing_still
 from dcmp_hil.section import Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
@@ -85,10 +85,7 @@ class PaperObserver:
         t, y, voltage, _ = sample
         dt = t - self._t
         if dt <= 0.0:
-            raise ProtocolError(
-                f"The sample at t = {t:.6f} s does not come after the one at {self._t:.6f} s. "
-                "Check the device's clock, or the time column of the recording."
-            )
+            raise standing_still(self._t, t)
         if dt <= self._restart_after:
             self._euler_step(dt, self._ku * voltage)
         else:  # the first sample (dt is NaN), or one after a gap too long to bridge

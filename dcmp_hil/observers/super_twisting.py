@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from dcmp_hil.errors import ProtocolError
+from dcmp_hil.observers import standing_still
 from dcmp_hil.observers.matched import Gains, luenberger_copy, matched_gains
 from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
@@ -157,10 +157,7 @@ class SuperTwisting:
     def _step(self, dt: float) -> _Step | None:
         """Find the coefficients of a step that is not one period; None where nothing can be continued."""
         if dt <= 0.0:
-            raise ProtocolError(
-                f"The sample at t = {self._t + dt:.6f} s does not come after the one at {self._t:.6f} s. "
-                "Check the device's clock, or the time column of the recording."
-            )
+            raise standing_still(self._t, self._t + dt)
         if not dt < _LONGEST_GAP * self._period + self._tolerance:  # NaN: the first sample
             return None
         n = round(dt / self._period)

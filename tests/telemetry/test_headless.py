@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,7 @@ from dcmp_hil.clock import pause
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
-from tests.telemetry.runs import EVENTS, VIEW, blocks, feed
+from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
 from tools.screenshot import APT, headless_viewer, look, screenshot, wait_until_loaded
 
 if TYPE_CHECKING:
@@ -122,6 +124,44 @@ def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunS
     assert addresses
     assert addresses <= _LOOPBACK
     assert coloured(tmp_path / "live.png", ESTIMATE) > 100
+
+
+_FROZEN = """
+import os, signal, sys
+from pathlib import Path
+from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun_sink import RerunSink
+from tests.telemetry.runs import VIEW, blocks
+window.PORT = int(sys.argv[1])
+sink = RerunSink(VIEW, Path(sys.argv[3]), "connect")
+made = blocks(3000)
+for block in made[:10]:
+    sink.block(block)
+os.kill(int(sys.argv[2]), signal.SIGSTOP)
+for block in made[10:]:
+    sink.block(block)
+sys.exit(len(sink.warnings))
+"""
+
+
+def test_a_viewer_that_freezes_keeps_neither_the_process_nor_the_file(tmp_path: Path) -> None:
+    port = window.free_port(25_000)
+    assert port is not None
+    options = ["--headless", "--bind", window.LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
+    with subprocess.Popen(
+        [window.viewer_binary(), *options],
+        env=window.viewer_environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as viewer:
+        try:
+            assert window.answers(port, 30.0)
+            arguments = [str(port), str(viewer.pid), str(tmp_path / "run.rrd")]
+            done = subprocess.run([sys.executable, "-c", _FROZEN, *arguments], timeout=40, check=False)
+        finally:
+            viewer.kill()
+    assert done.returncode == 0
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 3000
 
 
 def _reached(viewer: Any, wanted: int) -> int:

@@ -13,12 +13,16 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.display import display_available
+from dcmp_hil.telemetry.outlet import Outlet
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.telemetry.titles import title
 from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, entities, feed, read_back, values
@@ -26,6 +30,8 @@ from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, entities, feed, re
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from dcmp_hil.telemetry.outlet import Job
 
 
 @pytest.fixture(autouse=True)
@@ -65,6 +71,18 @@ def test_unknown_truth_is_left_out_and_lines_keep_their_names(tmp_path: Path) ->
     table = read_back(record, "joint/velocity_rad_s")
     assert table["SeriesLines:names"] == [["estimate", "reference"]]
     assert values(record, "joint/velocity_rad_s").shape == (1000, 2)
+
+
+def test_truth_is_drawn_even_if_the_first_block_is_one_row_without_a_disturbance(tmp_path: Path) -> None:
+    first, second = blocks(2, rows=1)
+    first.rows[0, FIELDS.index("disturbance_true")] = np.nan  # the plant has not moved yet
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    sink.block(first)
+    sink.block(second)
+    sink.close()
+    table = read_back(tmp_path / "run.rrd", "joint/disturbance_rad_s2")
+    assert table["SeriesLines:names"] == [["true (sim)", "estimate"]]
+    assert values(tmp_path / "run.rrd", "joint/disturbance_rad_s2")[1].tolist() == [2.5, 2.0]
 
 
 def test_an_arm_that_shows_the_true_position_at_50_hz(tmp_path: Path) -> None:
@@ -109,6 +127,15 @@ def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:
     assert {"rig/arm/rod", "rig/reference/outline", "rig/motor", "rig/dial"} <= entities(record)
 
 
+def test_the_limit_is_drawn_from_end_to_end_of_a_long_block(tmp_path: Path) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    (whole,) = blocks(3000, rows=4096)  # as in virtual time
+    sink.block(whole)
+    sink.close()
+    ticks = read_back(tmp_path / "run.rrd", "control/voltage_V/limit")["tick"]
+    assert ticks == list(range(0, 3000, 20))
+
+
 def test_no_limit_no_lines(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(dataclasses.replace(VIEW, voltage_limit=None), record, "none"), periods=200)
@@ -149,10 +176,44 @@ def test_connect_with_nobody_there_warns_and_goes_on(tmp_path: Path, monkeypatch
     with socket.socket() as free:
         free.bind((window.LOOPBACK, 0))
         monkeypatch.setattr(window, "PORT", free.getsockname()[1])
+    before_ns = MonotonicClock().now_ns()
     sink = RerunSink(VIEW, tmp_path / "run.rrd", "connect")
+    assert MonotonicClock().now_ns() - before_ns < 5e9
     assert "goes on without one" in sink.warnings[0]
     feed(sink, periods=100)
     assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
+
+
+def test_connect_to_somebody_who_accepts_and_says_nothing_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as mute:  # as a frozen viewer does
+        mute.bind((window.LOOPBACK, 0))
+        mute.listen()
+        monkeypatch.setattr(window, "PORT", mute.getsockname()[1])
+        assert window.answers(window.PORT, 0.5)
+        sink = RerunSink(VIEW, None, "connect")
+    assert "goes on without one" in sink.warnings[0]
+    sink.close()
+
+
+class _Stuck(Outlet):
+    """An outlet to a viewer that takes nothing."""
+
+    def do(self, job: Job) -> bool:  # noqa: ARG002
+        """Find no room."""
+        return False
+
+
+def test_a_viewer_that_takes_nothing_is_left_behind_and_the_file_stays_whole(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    monkeypatch.setattr(rerun_sink, "Outlet", _Stuck)
+    sink._open_viewer(rr.GrpcSink("rerun+http://127.0.0.1:1/proxy"), 1.0)  # noqa: SLF001
+    feed(sink, periods=500)
+    assert len(sink.warnings) == 1
+    assert "the run goes on" in sink.warnings[0]
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 500
+    assert "is left behind" in str(read_back(tmp_path / "run.rrd", "events/log")["TextLog:text"])
 
 
 def test_a_busy_port_is_passed_over() -> None:
