@@ -1,0 +1,92 @@
+"""A thread that may get stuck in Rerun without harm to anybody."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dcmp_hil.telemetry import outlet as module
+from dcmp_hil.telemetry.outlet import Outlet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+class Stream:
+    """A recording stream that notes what is done with it, and can be full."""
+
+    def __init__(self, *, full: bool = False) -> None:
+        self.done: list[Any] = []
+        self._full = full
+
+    def flush(self, *, timeout_sec: float) -> None:
+        if self._full:
+            raise RuntimeError(f"Flush timed out after {timeout_sec} s")
+        self.done.append("flushed")
+
+    def disconnect(self) -> None:
+        self.done.append("disconnected")
+
+
+@pytest.fixture
+def gate() -> Iterator[threading.Event]:
+    """Yield what a stuck job waits for; it is let go at the end."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+def outlet(stream: Stream, *, patience: float = 10.0, ending: float = 10.0) -> Outlet:
+    return Outlet(stream, patience, ending)  # type: ignore[arg-type]
+
+
+def test_jobs_are_done_in_order_and_the_stream_is_ended() -> None:
+    stream = Stream()
+    way = outlet(stream)
+    way.farewell = lambda: stream.done.append("farewell")
+    for k in range(100):
+        assert way.do(lambda s, k=k: s.done.append(k))  # type: ignore[misc]
+    way.close(10.0)
+    assert stream.done == [*range(100), "flushed", "farewell", "disconnected"]
+    way.close(10.0)
+    assert stream.done[-2:] == ["farewell", "disconnected"]
+
+
+def test_a_stuck_job_is_noticed_and_close_returns(gate: threading.Event) -> None:
+    stream = Stream()
+    way = outlet(stream, patience=0.01, ending=0.05)
+    way.do(lambda _: gate.wait())  # type: ignore[arg-type]
+    answers = [way.do(lambda _: None) for _ in range(module._WAITING + 2)]  # noqa: SLF001
+    assert answers[0]
+    assert not answers[-1]
+    way.close(10.0)
+    assert stream.done == []
+
+
+def test_a_stream_that_cannot_be_flushed_is_left_as_it_is() -> None:
+    stream = Stream(full=True)
+    outlet(stream).close(10.0)
+    assert stream.done == []
+
+
+def test_what_a_job_raised_reaches_whoever_comes_next() -> None:
+    way = outlet(Stream())
+    way.do(lambda _: {}[1])
+    with pytest.raises(KeyError):
+        way.close(10.0)
+    way.close(10.0)  # told once
+
+
+_LAZY = """
+import sys
+from dcmp_hil.telemetry import block, picture, recorder, ring, signals
+sys.exit(bool({"rerun", "matplotlib"} & set(sys.modules)))
+"""
+
+
+def test_the_loop_s_side_of_telemetry_imports_neither_rerun_nor_matplotlib() -> None:
+    assert subprocess.run([sys.executable, "-c", _LAZY], timeout=60, check=False).returncode == 0
