@@ -9,6 +9,16 @@ class Fault(IntEnum):
     """Fault code reported by the device; 0 is healthy, every other value stops the run."""
 
     NONE = 0
+    HOST_SILENT = 1  # the device heard no valid command for longer than its watchdog allows
+    LINK_DOWN = 2  # the line hung up, or the bus went off
+    STOPPED = 3  # somebody sent STOP
+    CORRUPT_LINK = 4  # 10 of the last 100 frames were damaged
+    OVER_SPEED = 5
+    OVER_TRAVEL = 6
+    ENCODER_JUMP = 7
+    BREAK_INPUT = 8  # the amplifier's own protection
+    INTERNAL = 9  # the firmware found itself in trouble
+    DISARMED = 254  # the device left RUN without a fault, as after a reset; never on the wire
     UNKNOWN = 255  # a code that this version does not know: treated like any other fault
 
 

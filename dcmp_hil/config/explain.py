@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.config.backends import Sim, SimBoard
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
 from dcmp_hil.config.words import toml_value
@@ -35,7 +36,7 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         if hasattr(value, "model_fields_set"):
-            if prefix or name != "sim" or rig.backend.kind == "sim":
+            if prefix or name != "sim" or simulated(rig):
                 rows += _rows(value, f"{prefix}{name}.", rig)
             continue
         if prefix == "sim.plant." and name not in section.model_fields_set:
@@ -46,6 +47,11 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
             continue
         rows.append((f"{prefix}{name}", _by_rule(name, rig) if value is None else toml_value(value), meaning))
     return rows
+
+
+def simulated(rig: Rig) -> bool:
+    """Whether [sim] matters: a plant of one's own may or may not look at it."""
+    return isinstance(rig.backend, Sim | SimBoard)
 
 
 def _kinds(prefix: str, name: str) -> str:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from dcmp_hil.config.backends import Can, CustomBackend, Serial, Sim, SimBoard
 from dcmp_hil.config.rules import RULES
 from dcmp_hil.config.sections import (
     AmplifierSection,
-    BackendSection,
     Custom,
     CustomController,
     EncoderSection,
@@ -42,6 +42,14 @@ def _kind_or_custom(default: str) -> Discriminator:
     return Discriminator(kind)
 
 
+BackendSection = Annotated[
+    Annotated[Sim, Tag("sim")]
+    | Annotated[SimBoard, Tag("sim-board")]
+    | Annotated[Serial, Tag("serial")]
+    | Annotated[Can, Tag("can")]
+    | Annotated[CustomBackend, Tag("custom")],
+    _kind_or_custom("sim"),
+]
 ObserverSection = Annotated[
     Annotated[SuperTwistingSettings, Tag("super_twisting")]
     | Annotated[PaperSettings, Tag("paper")]
@@ -66,6 +74,7 @@ ReferenceSection = Annotated[
 
 
 KINDS: dict[str, dict[str, type[Section]]] = {
+    "backend": {"sim": Sim, "sim-board": SimBoard, "serial": Serial, "can": Can, "custom": CustomBackend},
     "observer": {"super_twisting": SuperTwistingSettings, "paper": PaperSettings, "custom": Custom},
     "controller": {"pd_compensated": PdSettings, "pd": PdSettings, "custom": CustomController},
     "reference": {
@@ -86,7 +95,7 @@ class Rig(Section):
     name: str = Field(default="rig", max_length=60, pattern=r"^\w[\w.-]*$", examples=["my-rig"])
     """What the run's folder and the dashboard call it: up to 60 letters, digits, and . _ - inside."""
     loop: LoopSection = LoopSection()
-    backend: BackendSection = BackendSection()
+    backend: BackendSection = Sim()
     encoder: EncoderSection = EncoderSection()
     amplifier: AmplifierSection = AmplifierSection()
     model: ModelSection = ModelSection()
@@ -121,16 +130,23 @@ class Rig(Section):
         return max(1, round(self.period / (self.sim.step_us * 1e-6)))
 
     @property
-    def simulation_only(self) -> list[str]:
-        """What in this rig no amplifier or encoder of iron may be run with."""
-        loose = (
+    def impossible_on_a_wire(self) -> list[str]:
+        """What in this rig no device has, not even a simulated one."""
+        ideal = (
             ('encoder.counts_per_rev = "ideal"', self.encoder.counts is None),
             ('amplifier.voltage_limit_V = "none"', math.isinf(self.amplifier.limit)),
             ("loop.delay_samples = 0", self.loop.delay_samples == 0),
+        )
+        return [setting for setting, found in ideal if found]
+
+    @property
+    def simulation_only(self) -> list[str]:
+        """What in this rig no amplifier or encoder of iron may be run with."""
+        loose = (
             ('supervisor.monitors = "finite"', self.supervisor.monitors == "finite"),
             ('supervisor.start = "immediate"', self.supervisor.start == "immediate"),
         )
-        return [setting for setting, found in loose if found]
+        return self.impossible_on_a_wire + [setting for setting, found in loose if found]
 
     @model_validator(mode="after")
     def _check_rules(self) -> Rig:

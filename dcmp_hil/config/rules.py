@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from dcmp_hil.backends.kinds import KINDS as BACKENDS
+from dcmp_hil.config.backends import Device, Sim, SimBoard
+from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.units import in_words, split_unit
-from dcmp_hil.config.words import number, toml_value
+from dcmp_hil.config.words import number
 from dcmp_hil.observers.super_twisting import bandwidth_floor
 
 if TYPE_CHECKING:
@@ -56,22 +56,47 @@ def _floor_below_rate(rig: Rig) -> str:
 
 
 def _simulation_only(rig: Rig) -> str:
-    if rig.backend.kind == "sim" or rig.backend.kind not in BACKENDS or not rig.simulation_only:
+    kind = rig.backend.kind
+    if isinstance(rig.backend, Custom | Sim):
         return ""  # a module:Factory says for itself whether it is a simulation, when it is opened
+    loose = rig.impossible_on_a_wire if isinstance(rig.backend, SimBoard) else rig.simulation_only
+    if not loose:
+        return ""
     return (
-        f'backend.kind: got "{rig.backend.kind}", but {", ".join(rig.simulation_only)} is for simulation '
+        f'backend.kind: got "{kind}", but {", ".join(loose)} is for simulation '
         'only. Set backend.kind = "sim", or start from the rig bench-1khz.'
     )
 
 
-def _known_backend(rig: Rig) -> str:
-    kind = rig.backend.kind
-    if ":" in kind or kind in BACKENDS:
+def _whole_units(rig: Rig) -> str:
+    """Refuse what a device cannot say in whole numbers."""
+    if not isinstance(rig.backend, Device):
         return ""
-    close = get_close_matches(kind, list(BACKENDS), n=1)
-    hint = f' Did you mean "{close[0]}"?' if close else ""
-    known = ", ".join(toml_value(name) for name in BACKENDS)
-    return f'backend.kind: got {toml_value(kind)}; expected {known}, or "module:Factory" of your own.{hint}'
+    faults = []
+    period_us, counts = rig.period * 1e6, rig.encoder.counts
+    if abs(period_us - round(period_us)) > 1e-6 * period_us:
+        faults.append(
+            f"loop.rate_hz: got {number(rig.loop.rate_hz)}, a period of {period_us:.9g} us; "
+            f"a device has whole microseconds. {number(1e6 / round(period_us))} would do."
+        )
+    if counts is not None and counts != round(counts):
+        faults.append(
+            f"encoder.counts_per_rev: got {number(counts)}; a device has whole counts. "
+            f"{round(counts)} would do."
+        )
+    return "\n".join(faults)
+
+
+def _link_carries_rate(rig: Rig) -> str:
+    capacity = rig.backend.capacity if isinstance(rig.backend, Device) else None
+    if capacity is None or capacity.bits_per_period * rig.loop.rate_hz <= capacity.bits_per_second:
+        return ""
+    most = capacity.bits_per_second / capacity.bits_per_period
+    return (
+        f"backend.{capacity.key}: got {capacity.bits_per_second} bit/s, which carries {most:.0f} periods a "
+        f"second; loop.rate_hz = {number(rig.loop.rate_hz)} needs "
+        f"{math.ceil(capacity.bits_per_period * rig.loop.rate_hz)} bit/s."
+    )
 
 
 def _within_reason(rig: Rig) -> str:
@@ -105,9 +130,10 @@ def _beyond_reason(name: str, section: Section) -> Iterator[str]:
 
 RULES: tuple[Callable[[Rig], str], ...] = (
     _within_reason,
-    _known_backend,
     _step_divides_period,
     _floor_below_rate,
     _simulation_only,
+    _whole_units,
+    _link_carries_rate,
 )
 """Each returns its faults, one a line, beginning with the key; empty if there is none."""

@@ -20,18 +20,16 @@ class LoopSection(Section):
     """Periods from a sample to the instant at which its command acts: 1 on every real device."""
 
 
-class BackendSection(Section):
-    """`[backend]`: the way to the device."""
-
-    kind: str = "sim"
-    """`sim`, or `module:Factory` of your own, made as Factory(rig, clock)."""
-
-
 class EncoderSection(Section):
     """`[encoder]`: what one count means."""
 
     counts_per_rev: Annotated[float, Field(ge=16, le=2**24)] | Literal["ideal"] = 4096.0
     """Counts a revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
+
+    sign: Literal[1, -1] = 1
+    """-1 if the encoder counts down when the arm rises."""
+    zero: Annotated[int, Field(ge=-(2**23), le=2**23 - 1)] | Literal["at_start"] = "at_start"
+    """Count at which the arm hangs, or "at_start": where it is when a run begins. The simulated rig knows."""
 
     @property
     def counts(self) -> float | None:
@@ -46,6 +44,9 @@ class AmplifierSection(Section):
     """Largest voltage either way, V; "none" in simulation only."""
     slew_V_s: Annotated[float, Field(ge=1, le=1e9)] | Literal["none"] = "none"
     """Largest change, V/s; "none" for no limit."""
+
+    sign: Literal[1, -1] = 1
+    """-1 if a positive voltage lowers the arm."""
 
     @property
     def limit(self) -> float:

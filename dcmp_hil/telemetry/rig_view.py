@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.explain import explain
+from dcmp_hil.config.explain import explain, simulated
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -48,7 +48,7 @@ def view_of(rig: Rig) -> RigView:
         name=rig.name,
         parameters=tuple(sorted(rows, key=_place)),
         voltage_limit=limit if math.isfinite(limit) else None,
-        simulated=rig.backend.kind == "sim",
+        simulated=simulated(rig),
         period=rig.period,
     )
 

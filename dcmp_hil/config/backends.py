@@ -1,0 +1,98 @@
+"""The kinds of `[backend]`: the ways to a device."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import Field
+
+from dcmp_hil.config.sections import Custom
+from dcmp_hil.section import Section
+
+_PAIR_COBS = 2 * 14 * 10  # bits of a DRIVE and a SAMPLE on the wire, start and stop bits included
+_PAIR_SLCAN = 2 * 22 * 10
+_PAIR_CAN = 270  # the longest pair of classic frames, stuff bits and all
+
+
+class Capacity(NamedTuple):
+    """What a link carries, and what one period needs of it."""
+
+    key: str  # of [backend], that sets it
+    bits_per_second: int
+    bits_per_period: int
+
+
+class Sim(Section):
+    """The simulated rig, without a wire."""
+
+    kind: Literal["sim"] = "sim"
+    """The simulated rig: plant, encoder and amplifier behind read and write."""
+
+
+class Device(Section):
+    """What every device on the wire is told."""
+
+    node: Annotated[int, Field(ge=0, le=15)] = 0
+    """Number of the device on a shared bus."""
+    watchdog_ms: Annotated[int, Field(ge=5, le=50)] = 20
+    """The device goes to 0 V when it hears nothing valid for so long, ms."""
+
+    @property
+    def capacity(self) -> Capacity | None:
+        """What the link carries; None if that is no limit."""
+        return None
+
+
+class SimBoard(Device):
+    """The firmware's own C in this process, the simulated plant on its pins, real bytes in between."""
+
+    kind: Literal["sim-board"]
+    """The firmware's core compiled for this computer; needs a C compiler."""
+    carrier: Literal["cobs", "slcan", "can"] = "cobs"
+    """How frames travel."""
+
+
+class Serial(Device):
+    """A device on a serial port, COBS-framed."""
+
+    kind: Literal["serial"]
+    """A serial port (pyserial)."""
+    port: Annotated[str, Field(min_length=1, max_length=200, examples=["/dev/ttyACM0"])]
+    """Path of the port, or the serial number of its USB adapter; `dcmp-hil ports` lists both."""
+    baud: Annotated[int, Field(ge=9600, le=12_000_000)] = 1_000_000
+    """Bits per second; a USB device that is no adapter ignores it."""
+
+    @property
+    def capacity(self) -> Capacity | None:
+        """The line's."""
+        return Capacity("baud", self.baud, _PAIR_COBS)
+
+
+class Can(Device):
+    """A device on a CAN bus."""
+
+    kind: Literal["can"]
+    """A CAN interface (python-can)."""
+    interface: Annotated[str, Field(min_length=1, max_length=40, examples=["socketcan"])] = "socketcan"
+    """Interface as python-can names it: socketcan, slcan, pcan, kvaser, vector, gs_usb, virtual ..."""
+    channel: Annotated[str | int, Field(examples=["can0"])] = "can0"
+    """Channel of that interface: can0, PCAN_USBBUS1, 0, /dev/ttyACM0 ..."""
+    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
+    """Bit rate, bit/s; socketcan takes it from `ip link` instead."""
+    baud: Annotated[int, Field(ge=9600, le=12_000_000)] = 1_000_000
+    """Bits per second of the serial line under interface = "slcan"."""
+    options: dict[str, Any] = Field(default_factory=dict)
+    """Handed to python-can's interface as they are, such as `fd = false`."""
+
+    @property
+    def capacity(self) -> Capacity | None:
+        """The bus's, or that of the serial line to it."""
+        if self.interface == "virtual":
+            return None
+        if self.interface == "slcan":
+            return Capacity("baud", self.baud, _PAIR_SLCAN)
+        return Capacity("bitrate", self.bitrate, _PAIR_CAN)
+
+
+class CustomBackend(Custom):
+    """A backend of your own: `kind = "module:Factory"`, made as Factory(rig, clock)."""
