@@ -9,6 +9,7 @@ from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import Encoder
+from sim_backend.pace import Pace
 from sim_backend.plant import EulerPlant, MoreauPlant, Plant
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 _PLANTS: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
-_FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
 
 
 class SimBackend:
@@ -38,10 +38,8 @@ class SimBackend:
     simulated = True
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        self._clock = clock
+        self._pace = Pace(clock, rig.period)
         self._period = rig.period
-        self._period_ns = 1e9 * rig.period
-        self._start_ns = 0
         self._tick = 0
         self._plant = _plant(rig)
         self._encoder = Encoder(
@@ -62,7 +60,7 @@ class SimBackend:
     def __enter__(self) -> Self:
         """Switch the amplifier on, at 0 V."""
         self._amplifier.live = True
-        self._start_ns = self._clock.now_ns()
+        self._pace.start()
         return self
 
     def __exit__(
@@ -87,7 +85,7 @@ class SimBackend:
             self._truth = self._plant.advance(voltage)
         tick = self._tick
         self._tick = tick + 1
-        self._keep_pace(tick)
+        self._pace.wait_for(tick)
         return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
 
     def write(self, voltage: float) -> None:
@@ -102,13 +100,6 @@ class SimBackend:
     def live(self) -> bool:
         """Whether the amplifier is on; off, it puts out 0 V whatever it is told."""
         return self._amplifier.live
-
-    def _keep_pace(self, tick: int) -> None:
-        deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
-        self._clock.sleep_until_ns(deadline_ns)
-        behind_ns = self._clock.now_ns() - deadline_ns
-        if behind_ns > _FORGIVEN_NS:
-            self._start_ns += behind_ns  # after a stop of the process: no burst of old periods
 
 
 def _plant(rig: Rig) -> Plant:

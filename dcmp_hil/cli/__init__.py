@@ -11,7 +11,9 @@ import typer
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.check import check
+from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.paper import paper
+from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
@@ -24,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, check, paper, replay, rigs):
+for command in (run, check, paper, replay, rigs, ports, monitor):
     app.command()(command)
 
 

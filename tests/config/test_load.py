@@ -34,7 +34,7 @@ def file(folder: Path, text: str, name: str = "mine.toml") -> str:
 
 
 def test_shipped_rigs_load() -> None:
-    assert shipped_rigs() == ["bench-1khz", "paper"]
+    assert shipped_rigs() == ["bench-1khz", "bench-can", "bench-serial", "paper"]
     assert [load_rig(name).name for name in shipped_rigs()] == shipped_rigs()
 
 

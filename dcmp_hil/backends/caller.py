@@ -1,0 +1,102 @@
+"""Asking a device and waiting for its answer: what handshake, goodbye and `ports` have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
+from dcmp_hil.wire.messages import SampleReport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.backends.link import Link
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.wire.messages import Message
+
+_Answer = TypeVar("_Answer")
+
+REPEAT = 0.05  # s, after which a question is asked again
+PATIENCE = 0.5  # s, for an answer in all
+
+
+class Caller:
+    """One side of a conversation with one device.
+
+    Parameters
+    ----------
+    link
+        Open.
+    clock
+        Times the waiting.
+    node
+        Of the device.
+    """
+
+    def __init__(self, link: Link, clock: Clock, node: int) -> None:
+        self._link, self._clock, self._node = link, clock, node
+        self.sample: SampleReport | None = None  # the newest
+        self.samples = 0
+        self.foreign = 0  # frames that are not this device's
+        self.corrupt = 0  # frames whose crc8 was wrong
+
+    def say(self, message: Message) -> None:
+        """Send a message."""
+        self._link.send(pack(message, self._node))
+
+    def hear(self, timeout: float) -> Message | None:
+        """Return the next message of this device; None after `timeout` (s)."""
+        deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
+        while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
+            frame = self._link.receive(1e-9 * left_ns)
+            if frame is None:
+                continue
+            try:
+                message = unpack(frame, self._node)
+            except CorruptFrameError:
+                self.corrupt += 1
+                continue
+            if message is None:
+                self.foreign += 1
+                continue
+            if isinstance(message, SampleReport):
+                self.sample = message
+                self.samples += 1
+            return message
+        return None
+
+    def overhear(self, timeout: float) -> tuple[int, Message] | None:
+        """Return node and message of the next frame of any device or host; None after `timeout` (s)."""
+        frame = self._link.receive(timeout)
+        if frame is None:
+            return None
+        node = frame.id & 0xF
+        try:
+            message = unpack(frame, node)
+        except CorruptFrameError:
+            self.corrupt += 1
+            return None
+        return None if message is None else (node, message)
+
+    def hear_sample(self, timeout: float) -> SampleReport | None:
+        """Return the next SAMPLE; None after `timeout` (s)."""
+        return self._until(timeout, SampleReport, lambda _: True)
+
+    def ask(
+        self, question: Message, answer: type[_Answer], fits: Callable[[_Answer], bool] = lambda _: True
+    ) -> _Answer | None:
+        """Ask, and ask again, until an answer of that type fits; None if none came in time."""
+        for _ in range(round(PATIENCE / REPEAT)):
+            self.say(question)
+            found = self._until(REPEAT, answer, fits)
+            if found is not None:
+                return found
+        return None
+
+    def _until(self, timeout: float, kind: type[_Answer], fits: Callable[[_Answer], bool]) -> _Answer | None:
+        deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
+        while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
+            message = self.hear(1e-9 * left_ns)
+            if isinstance(message, kind) and fits(message):
+                return message
+        return None

@@ -1,0 +1,214 @@
+"""Frames over CAN, through any interface that python-can has."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import termios
+from typing import TYPE_CHECKING, Any
+
+import can
+import serial
+
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.backends.failures import cannot_open
+from dcmp_hil.backends.serial_link import path_of
+from dcmp_hil.backends.slcan_bus import SlcanBus
+from dcmp_hil.config.backends import Can as CanSettings
+from dcmp_hil.errors import ConfigError, LinkError, OpenError
+from dcmp_hil.wire.frame import Frame
+
+if TYPE_CHECKING:
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+
+FAILURES = (
+    can.CanError,
+    serial.SerialException,
+    OSError,
+    termios.error,
+    ValueError,
+    TypeError,
+    AttributeError,
+)
+"""What interfaces of python-can raise when they fail; TypeError and AttributeError come from closed "
+"ports."""
+
+_NETWORKED = ("udp_multicast", "socketcand", "cantact_net", "neousys_net")
+_BUS_OFF = 0x40  # of the identifier of socketcan's error frames
+_LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
+
+
+def open_can(rig: Rig, clock: Clock) -> DeviceBackend:
+    """Make the backend of a device on a CAN bus."""
+    settings = rig.backend
+    if not isinstance(settings, CanSettings):
+        raise ConfigError(f'backend.kind: got "{settings.kind}"; expected "can".')
+    return DeviceBackend(rig, CanLink(settings, clock), clock)
+
+
+class CanLink:
+    """A CAN bus.
+
+    Waiting is done here and not in python-can, whose timeouts count on the wall clock.
+
+    Parameters
+    ----------
+    settings
+        Interface, channel, bit rate.
+    clock
+        Slept on between two looks, where the interface has nothing that can be waited on.
+    """
+
+    def __init__(self, settings: CanSettings, clock: Clock) -> None:
+        self.name = f"{settings.interface} {settings.channel}"
+        self._settings, self._clock = settings, clock
+        self._bus: can.BusABC | None = None
+        self._poll: select.poll | None = None
+
+    @property
+    def corrupt(self) -> int:
+        """What arrived so far and was no frame; most interfaces keep that to themselves."""
+        return self._bus.corrupt if isinstance(self._bus, SlcanBus) else 0
+
+    def open(self) -> None:
+        """Open the interface.
+
+        Raises
+        ------
+        OpenError
+            If there is no such interface or channel, or it cannot be opened.
+        ConfigError
+            If the interface reaches beyond this machine.
+        """
+        self._bus = bus = _open_bus(self._settings)
+        try:
+            number = bus.fileno()
+        except (NotImplementedError, *FAILURES):
+            return
+        self._poll = select.poll()
+        self._poll.register(number, select.POLLIN)
+
+    def close(self) -> None:
+        """Close the interface."""
+        bus, self._bus, self._poll = self._bus, None, None
+        if bus is None:
+            return
+        with contextlib.suppress(*FAILURES):  # it is gone: that is closed
+            bus.shutdown()
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame; what the interface has no room for is dropped.
+
+        Raises
+        ------
+        LinkError
+            If the interface failed.
+        """
+        message = can.Message(arbitration_id=frame.id, data=frame.data, is_extended_id=False, check=False)
+        try:
+            self._opened().send(message, timeout=0)
+        except can.CanOperationError as error:
+            if not _is_full(error):
+                raise self._broken(error) from error
+        except FAILURES as error:
+            raise self._broken(error) from error
+
+    def receive(self, timeout: float) -> Frame | None:
+        """Return the next frame; None if none came within `timeout` (s) of silence.
+
+        Raises
+        ------
+        LinkError
+            If the interface failed, or the bus went off.
+        """
+        frame = self._look()
+        if frame is not None or timeout <= 0.0:
+            return frame
+        if self._poll is not None:
+            return self._look() if self._poll.poll(1e3 * timeout) else None
+        deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
+        while frame is None and (now_ns := self._clock.now_ns()) < deadline_ns:
+            self._clock.sleep_until_ns(min(now_ns + _LOOK_NS, deadline_ns))
+            frame = self._look()
+        return frame
+
+    def _look(self) -> Frame | None:
+        """Return a frame that is there; remote and extended ones are not ours."""
+        bus = self._opened()
+        try:
+            while (message := bus.recv(0.0)) is not None:
+                if message.is_error_frame:
+                    self._check_bus(message)
+                elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
+                    return Frame(message.arbitration_id, bytes(message.data))
+        except FAILURES as error:
+            raise self._broken(error) from error
+        return None
+
+    def _check_bus(self, message: can.Message) -> None:
+        if message.arbitration_id & _BUS_OFF:
+            raise LinkError(
+                f"{self.name}: bus-off. Check termination (120 ohm at both ends), bit rate and wiring, "
+                f"then bring the "
+                f"interface up again: ip link set {self._settings.channel} down, then up."
+            )
+
+    def _opened(self) -> can.BusABC:
+        if self._bus is None:
+            raise LinkError(f"{self.name}: not open. Use the backend as a context manager.")
+        return self._bus
+
+    def _broken(self, error: BaseException) -> LinkError:
+        return LinkError(
+            f"{self.name}: the connection broke ({error}). The device goes to 0 V by itself. Look at "
+            f"adapter, cable "
+            "and bus, then start again."
+        )
+
+
+def _open_bus(settings: CanSettings) -> can.BusABC:
+    interface, channel = settings.interface, settings.channel
+    if interface in _NETWORKED:
+        raise ConfigError(
+            f'backend.interface: "{interface}" reaches over the network; a motor is driven from the machine '
+            "that it is plugged into."
+        )
+    if interface != "virtual" and interface not in can.VALID_INTERFACES:
+        raise ConfigError(
+            f'backend.interface: python-can has no "{interface}". It has: '
+            f"{', '.join(sorted(can.VALID_INTERFACES))}."
+        )
+    options: dict[str, Any] = dict(settings.options)
+    try:
+        if interface == "slcan":
+            return SlcanBus(path_of(str(channel)), settings.baud, settings.bitrate, **options)
+        return can.Bus(
+            channel=channel, interface=interface, bitrate=settings.bitrate, ignore_config=True, **options
+        )
+    except FAILURES as error:
+        raise _cannot_open(settings, error) from error
+    except (ImportError, can.CanInterfaceNotImplementedError) as error:
+        raise OpenError(
+            f"{interface}: its driver is missing: {error}. See python-can's page of it."
+        ) from error
+
+
+def _cannot_open(settings: CanSettings, error: BaseException) -> OpenError:
+    cause = error
+    while cause.__cause__ is not None:
+        cause = cause.__cause__
+    if settings.interface == "slcan":
+        return cannot_open(str(settings.channel), cause)
+    return OpenError(
+        f"{settings.interface} {settings.channel}: cannot be opened: {cause}. Check backend.channel and "
+        f"that the "
+        f"interface is up; for socketcan: ip link set {settings.channel} up type can bitrate "
+        f"{settings.bitrate}."
+    )
+
+
+def _is_full(error: can.CanOperationError) -> bool:
+    """Whether a frame found no room: nobody acknowledges, or the bus is busier than the adapter."""
+    words = str(error).lower()
+    return "full" in words or "buffer space" in words or "could not send message" in words

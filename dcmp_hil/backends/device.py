@@ -1,0 +1,232 @@
+"""A device behind any link, as a backend: whole numbers on one side, radians and volts on the other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from dcmp_hil.backends.caller import Caller
+from dcmp_hil.backends.goodbye import Goodbye
+from dcmp_hil.backends.handshake import Handshake
+from dcmp_hil.backends.terms import Terms
+from dcmp_hil.errors import BackendError, LinkError, SampleTimeoutError, TripError
+from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
+from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
+from dcmp_hil.wire.counters import nearest
+from dcmp_hil.wire.messages import Drive, FaultReport, Health, SampleReport, State, Stop, StopReason
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from dcmp_hil.backends.link import Link
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.wire.frame import Frame
+
+_SEQ = 0x1FFF
+_RUN = int(State.RUN)
+_OTHER_FAULT = 7  # fault_class that only says: see FAULT
+_SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: the end
+
+
+@dataclass(slots=True)
+class LinkCounters:
+    """What went wrong on the way and was survived."""
+
+    lost: int = 0  # SAMPLEs that never came
+    stale: int = 0  # SAMPLEs that came too late, or twice
+    skipped: int = 0  # SAMPLEs that were waiting behind a newer one
+    corrupt: int = 0  # frames whose crc8 was wrong
+
+
+class DeviceBackend:
+    """Reads SAMPLEs, writes DRIVEs, and leaves the amplifier at 0 V.
+
+    Signs, counts per revolution and zero are applied here and nowhere else. The device is the sample clock:
+    `read` waits for its next frame.
+
+    Parameters
+    ----------
+    rig
+        Its `[backend]`, `[encoder]`, `[amplifier]` and `[loop]` tables are used.
+    link
+        Not yet open.
+    clock
+        Times the waiting.
+    """
+
+    def __init__(self, rig: Rig, link: Link, clock: Clock) -> None:
+        self._terms = terms = Terms.of(rig)
+        self._link, self._clock = link, clock
+        self._node, self._period = terms.node, rig.period
+        self._patience_ns = int(1e9 * max(_SILENT_PERIODS * rig.period, _SILENT_S))
+        self._open = False
+        self._session = 0
+        self._tick = self._first_tick = 0
+        self._count = self._zero = 0
+        self._has_count = False
+        self._t = 0.0
+        self._fault: int = Fault.NONE
+        self._ttl_ms = terms.watchdog_ms
+        self.counters = LinkCounters()
+        self.health: Health | None = None
+        self.firmware = ""
+
+    def __enter__(self) -> Self:
+        """Open the link, make the device ours, and arm it at 0 V.
+
+        Raises
+        ------
+        OpenError
+            If the link cannot be opened, or the device does not arm.
+        ConfigError
+            If the device is not what the rig says.
+        """
+        self._link.open()
+        try:
+            caller = Caller(self._link, self._clock, self._node)
+            greeting = Handshake(self._link, caller, self._terms, self._clock).run()
+        except BaseException:
+            self._link.close()
+            raise
+        self._session, self.firmware = greeting.session, greeting.firmware
+        self._tick = greeting.tick
+        self._first_tick = greeting.tick + 1
+        self._open = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Drive 0 V, disarm, wait for the echo, give the device back, close.
+
+        After a trip it is STOP, which the device keeps as a fault.
+
+        Raises
+        ------
+        LinkError
+            If the device did not confirm 0 V, and nothing else was wrong before.
+        """
+        if not self._open:
+            return
+        self._open = False
+        try:
+            self._leave(error)
+        except BackendError:
+            if error is None:
+                raise
+        finally:
+            self._link.close()
+
+    def read(self) -> Sample:
+        """Wait for the next SAMPLE and return the newest.
+
+        Raises
+        ------
+        SampleTimeoutError
+            If none came for 10 periods or 20 ms, whichever is longer; STOP was sent.
+        LinkError
+            If the link broke, or the backend is not open.
+        """
+        if not self._open:
+            raise LinkError("The device is not open. Use it as a context manager: with backend: ...")
+        report = self._next_report()
+        self._count_periods(report)
+        raw = report.position_counts
+        if not self._has_count:
+            self._start_counting(raw)
+        self._count = count = nearest(self._count, raw, 24)
+        terms = self._terms
+        position = (count - self._zero) * terms.rad_per_count
+        return Sample(self._t, position, report.voltage_mV / terms.mV_per_V, self._fault_in(report))
+
+    def write(self, voltage: float) -> None:
+        """Send a voltage, V; a number that is not finite is sent as 0 V."""
+        asked_mV = round(voltage * self._terms.mV_per_V) if math.isfinite(voltage) else 0
+        voltage_mV = max(-32_768, min(32_767, asked_mV))
+        drive = Drive(voltage_mV, self._tick & _SEQ, True, False, False, self._session, self._ttl_ms)
+        self._link.send(pack(drive, self._node))
+
+    def truth(self) -> Truth:
+        """Return NaN: nobody knows."""
+        return UNKNOWN_TRUTH
+
+    def _next_report(self) -> SampleReport:
+        """Wait for a SAMPLE; where several are waiting, the newest."""
+        receive, newest = self._link.receive, None
+        deadline_ns = self._clock.now_ns() + self._patience_ns
+        left_ns = self._patience_ns
+        while newest is None:
+            frame = receive(1e-9 * left_ns)
+            if frame is not None:
+                newest = self._sample_in(frame)
+            left_ns = deadline_ns - self._clock.now_ns()
+            if newest is None and left_ns <= 0:
+                self._give_up()
+        while (frame := receive(0.0)) is not None:
+            newer = self._sample_in(frame)
+            if newer is not None:
+                self.counters.skipped += 1
+                newest = newer
+        return newest
+
+    def _sample_in(self, frame: Frame) -> SampleReport | None:
+        """Return the SAMPLE in a frame if it is newer than the last one; keep what else tells something."""
+        try:
+            message = unpack(frame, self._node)
+        except CorruptFrameError:
+            self.counters.corrupt += 1
+            return None
+        if type(message) is SampleReport:
+            if nearest(self._tick, message.tick, 8) > self._tick or message.state != _RUN:
+                return message
+            self.counters.stale += 1
+        elif type(message) is FaultReport:
+            self._fault = message.code
+        elif type(message) is Health:
+            self.health = message
+        return None
+
+    def _count_periods(self, report: SampleReport) -> None:
+        """Advance device time; lost samples show as a larger step."""
+        tick = nearest(self._tick, report.tick, 8)
+        if tick <= self._tick:  # a device that was reset counts anew
+            tick = self._tick + 1
+        self.counters.lost += tick - self._tick - 1
+        self._tick = tick
+        self._t = (tick - self._first_tick) * self._period
+
+    def _start_counting(self, raw: int) -> None:
+        self._has_count = True
+        self._count = nearest(0, raw, 24)
+        self._zero = self._count if self._terms.zero is None else self._terms.zero
+
+    def _fault_in(self, report: SampleReport) -> int:
+        if report.state == _RUN:
+            return Fault.NONE
+        if report.fault_class == Fault.NONE:
+            return Fault.DISARMED
+        if report.fault_class < _OTHER_FAULT:
+            return report.fault_class
+        return self._fault or Fault.UNKNOWN
+
+    def _give_up(self) -> None:
+        self._link.send(pack(Stop(StopReason.NO_SAMPLE), self._node))
+        raise SampleTimeoutError(
+            f"{self._link.name}: no sample for {1e-6 * self._patience_ns:.0f} ms. The device's watchdog "
+            f"has taken the "
+            "amplifier to 0 V. Check cable and power of the device, then start again."
+        )
+
+    def _leave(self, error: BaseException | None) -> None:
+        caller = Caller(self._link, self._clock, self._node)
+        goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms, self._tick)
+        if isinstance(error, TripError):
+            caller.say(Stop(StopReason.SUPERVISOR))
+        if not goodbye.run():
+            raise LinkError(
+                f"{self._link.name}: the device did not confirm 0 V. Its watchdog acts after "
+                f"{self._ttl_ms} ms "
+                "without a command; look at the amplifier before you touch the arm."
+            )

@@ -1,0 +1,39 @@
+"""What a link is: frames out, frames in, and nothing about what they mean."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from dcmp_hil.wire.frame import Frame
+
+
+class Link(Protocol):
+    """A way for frames: CAN, serial or simulated.
+
+    Its own failures are OpenError and LinkError; no exception of a library gets past it.
+    """
+
+    name: str
+    """What to call it in a sentence, such as `/dev/ttyACM0`."""
+
+    @property
+    def corrupt(self) -> int:
+        """What arrived so far and was no frame."""
+        ...
+
+    def open(self) -> None:
+        """Open it, alone."""
+        ...
+
+    def close(self) -> None:
+        """Close it; closing what is not open does nothing."""
+        ...
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame, or drop it: never blocks."""
+        ...
+
+    def receive(self, timeout: float) -> Frame | None:
+        """Return the next frame; None if none came within about `timeout` (s). 0 only looks what is there."""
+        ...

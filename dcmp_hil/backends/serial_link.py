@@ -1,0 +1,182 @@
+"""Frames over a serial port, COBS-framed (pyserial)."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import termios
+from collections import deque
+from typing import TYPE_CHECKING
+
+import serial
+from serial.tools import list_ports
+
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.backends.failures import cannot_open
+from dcmp_hil.config.backends import Serial as SerialSettings
+from dcmp_hil.errors import ConfigError, LinkError, OpenError
+from dcmp_hil.wire import cobs
+
+if TYPE_CHECKING:
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.wire.frame import Frame
+
+FAILURES = (serial.SerialException, OSError, termios.error, ValueError, TypeError)
+"""What pyserial raises when a port fails: four unrelated types, TypeError if it was closed meanwhile."""
+
+_CHUNK = 4096
+_DELIMITER = b"\0"
+
+
+def open_serial(rig: Rig, clock: Clock) -> DeviceBackend:
+    """Make the backend of a device on a serial port."""
+    settings = rig.backend
+    if not isinstance(settings, SerialSettings):
+        raise ConfigError(f'backend.kind: got "{settings.kind}"; expected "serial".')
+    return DeviceBackend(rig, SerialLink(settings.port, settings.baud), clock)
+
+
+class SerialLink:
+    """A serial port, opened by this process alone.
+
+    Parameters
+    ----------
+    port
+        Path, or the serial number of its USB adapter.
+    baud
+        Bit/s.
+    """
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.name = port
+        self._baud = baud
+        self._serial: serial.Serial | None = None
+        self._poll = select.poll()
+        self._receiver = cobs.Receiver()
+        self._frames: deque[Frame] = deque()
+
+    @property
+    def corrupt(self) -> int:
+        """What arrived so far and was no frame."""
+        return self._receiver.corrupt
+
+    def open(self) -> None:
+        """Open the port, exclusively, in low-latency mode where there is one.
+
+        Raises
+        ------
+        OpenError
+            If there is none, it is busy, it may not be opened, or it cannot do this baud rate.
+        """
+        self.name = path = path_of(self.name)
+        self._serial = port = open_port(path, self._baud)
+        self._poll.register(port.fileno(), select.POLLIN)
+        self._write(_DELIMITER)  # ends whatever the line carried before
+
+    def close(self) -> None:
+        """Close the port."""
+        port, self._serial = self._serial, None
+        if port is None:
+            return
+        try:
+            self._poll.unregister(port.fileno())
+            port.close()
+        except FAILURES:
+            pass  # it is gone: that is closed
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame; what the port has no room for is dropped, for the device to refuse.
+
+        Raises
+        ------
+        LinkError
+            If the port failed.
+        """
+        self._write(cobs.encode(frame))
+
+    def receive(self, timeout: float) -> Frame | None:
+        """Return the next frame; None if none was complete within `timeout` (s) of silence.
+
+        Raises
+        ------
+        LinkError
+            If the port failed.
+        """
+        frames = self._frames
+        if frames:
+            return frames.popleft()
+        port = self._opened()
+        try:
+            if not self._poll.poll(1e3 * timeout):
+                return None
+            frames.extend(self._receiver.feed(port.read(_CHUNK)))
+        except FAILURES as error:
+            raise self._broken(error) from error
+        return frames.popleft() if frames else None
+
+    def _write(self, data: bytes) -> None:
+        port = self._opened()
+        try:
+            write_now(port, data)
+        except FAILURES as error:
+            raise self._broken(error) from error
+
+    def _opened(self) -> serial.Serial:
+        if self._serial is None:
+            raise LinkError(f"{self.name}: not open. Use the backend as a context manager.")
+        return self._serial
+
+    def _broken(self, error: BaseException) -> LinkError:
+        return LinkError(
+            f"{self.name}: the connection broke ({error}). The device goes to 0 V by itself. Plug it in, "
+            "look at the cable, then start again."
+        )
+
+
+def open_port(path: str, baud: int) -> serial.Serial:
+    """Open a serial port for this process alone; reads and writes never block.
+
+    Raises
+    ------
+    OpenError
+        If there is none, it is busy, it may not be opened, or it cannot do this baud rate.
+    """
+    try:
+        port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
+    except (ValueError, OverflowError) as error:
+        raise OpenError(f"{path}: cannot do {baud} baud ({error}). Choose another backend.baud.") from error
+    except FAILURES as error:
+        raise cannot_open(path, error) from error
+    try:
+        port.set_low_latency_mode(True)
+    except (*FAILURES, NotImplementedError):
+        pass  # most ports have no such mode; the round trip is measured before arming
+    return port
+
+
+def write_now(port: serial.Serial, data: bytes) -> None:
+    """Write what there is room for; pyserial's own write spins for ever on a full buffer."""
+    with contextlib.suppress(BlockingIOError):  # nobody reads at the other end; its watchdog knows
+        os.write(port.fileno(), data)
+
+
+def path_of(port: str) -> str:
+    """Return the path of a port that is given by path or by serial number.
+
+    Raises
+    ------
+    OpenError
+        If no port has that serial number.
+    """
+    if "/" in port or port.upper().startswith("COM"):
+        return port
+    known = {found.serial_number: found.device for found in list_ports.comports() if found.serial_number}
+    if port in known:
+        return str(known[port])
+    there = ", ".join(f"{number} ({path})" for number, path in known.items()) or "none"
+    raise OpenError(
+        f"{port}: no serial port has this serial number. There are: {there}. A path contains a slash, "
+        "such as /dev/ttyACM0."
+    )

@@ -1,0 +1,79 @@
+"""What host and device must agree on, and how the wire's whole numbers become radians and volts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dcmp_hil.config.backends import Device
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+
+_UNLIMITED = 32_767  # mV: what the wire can say
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What a rig says of its device.
+
+    Parameters
+    ----------
+    node
+        Of the device on its bus.
+    counts_per_rev
+        Counts, must be the device's own.
+    period_us
+        us, must be the device's own.
+    voltage_limit_mV
+        mV, either way; the device's own, or lower.
+    slew_mV_per_ms
+        mV per ms; None leaves the device's own.
+    watchdog_ms
+        ms, 5 to 50.
+    rad_per_count
+        rad, signed by the encoder's wiring.
+    mV_per_V
+        1000, signed by the amplifier's wiring.
+    zero
+        Count at which the arm hangs; None for where it is at the start.
+    """
+
+    node: int
+    counts_per_rev: int
+    period_us: int
+    voltage_limit_mV: int
+    slew_mV_per_ms: int | None
+    watchdog_ms: int
+    rad_per_count: float
+    mV_per_V: float
+    zero: int | None
+
+    @classmethod
+    def of(cls, rig: Rig) -> Terms:
+        """Read them from a rig whose backend is a device.
+
+        Raises
+        ------
+        ConfigError
+            If the rig has no device on a wire.
+        """
+        device, counts = rig.backend, rig.encoder.counts
+        if not isinstance(device, Device) or counts is None:
+            raise ConfigError(
+                f'backend.kind: got "{device.kind}"; expected a device on a wire, such as "serial".'
+            )
+        slew = rig.amplifier.slew
+        return cls(
+            node=device.node,
+            counts_per_rev=round(counts),
+            period_us=round(1e6 * rig.period),
+            voltage_limit_mV=round(min(1e3 * rig.amplifier.limit, _UNLIMITED)),
+            slew_mV_per_ms=None if math.isinf(slew) else max(1, round(slew)),
+            watchdog_ms=device.watchdog_ms,
+            rad_per_count=rig.encoder.sign * math.tau / counts,
+            mV_per_V=1e3 * rig.amplifier.sign,
+            zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
+        )

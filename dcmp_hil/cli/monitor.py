@@ -1,0 +1,27 @@
+"""`dcmp-hil monitor`: decoded traffic, live."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from dcmp_hil.cli.options import Overrides, RigName
+
+
+def monitor(
+    rig: RigName = "bench-serial",
+    overrides: Overrides = None,
+    duration: Annotated[float, typer.Option(metavar="S", help="Length, s; 0 = until Ctrl-C.")] = 0.0,
+    all_frames: Annotated[
+        bool, typer.Option("--all", help="Every SAMPLE and DRIVE, not ten a second.")
+    ] = False,
+) -> None:
+    """Print what travels on a link, decoded, without taking part: no session, nothing is sent.
+
+    A serial port has one reader: while a run has it, this says so and ends.
+    """
+    from dcmp_hil.cli.monitoring import watch
+    from dcmp_hil.config import load_rig
+
+    watch(load_rig(rig, overrides or ()), duration, all_frames=all_frames)

@@ -1,0 +1,89 @@
+"""One `dcmp-hil monitor` from opening the link to its last line."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from dcmp_hil.backends.caller import Caller
+from dcmp_hil.backends.discovery import state_in_words
+from dcmp_hil.backends.links import make_link
+from dcmp_hil.cli import console
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.endings import StopRequest
+from dcmp_hil.values import Fault
+from dcmp_hil.wire.messages import Drive, FaultReport, Parameter, ParameterValue, SampleReport
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+    from dcmp_hil.wire.messages import Message
+
+_LOOK = 0.1  # s, how long a Ctrl-C waits at most
+_BRIEF_NS = 100_000_000  # between two SAMPLEs, or two DRIVEs, that are shown
+_STREAMS = (SampleReport, Drive)
+
+
+class _Brief:
+    """Lets ten SAMPLEs and ten DRIVEs a second through, and everything else."""
+
+    def __init__(self) -> None:
+        self._shown: dict[tuple[int, type], int] = {}
+
+    def lets_through(self, node: int, message: Message, now_ns: int) -> bool:
+        """Return whether this message is to be shown."""
+        kind = (node, type(message))
+        if isinstance(message, _STREAMS) and now_ns - self._shown.get(kind, -_BRIEF_NS) < _BRIEF_NS:
+            return False
+        self._shown[kind] = now_ns
+        return True
+
+
+def watch(rig: Rig, duration: float, *, all_frames: bool) -> None:
+    """Print messages until `duration` (s, 0 for ever) is over or somebody asks for the end."""
+    clock = MonotonicClock()
+    link = make_link(rig.backend, clock)
+    link.open()
+    began_ns = clock.now_ns()
+    until_ns = began_ns + 1e9 * duration if duration else math.inf
+    caller, brief = Caller(link, clock, 0), _Brief()
+    heard = 0
+    console.note(f"listening on {link.name}; Ctrl-C ends it")
+    try:
+        with StopRequest() as stop:
+            while not stop.requested and (now_ns := clock.now_ns()) < until_ns:
+                found = caller.overhear(_LOOK)
+                if found is None:
+                    continue
+                heard += 1
+                if all_frames or brief.lets_through(*found, now_ns):
+                    _show(1e-9 * (now_ns - began_ns), *found)
+    finally:
+        link.close()
+    damaged = link.corrupt + caller.corrupt
+    console.note(f"{heard} messages, {damaged} damaged frames")
+
+
+def _show(t: float, node: int, message: Message) -> None:
+    name = type(message).__name__.removesuffix("Report")
+    line = Text.assemble(f"{t:9.3f} s  {node:2}  ", (f"{name:15}", "bold"), _in_words(message))
+    console.out.print(line, no_wrap=True, crop=False, overflow="ignore")
+
+
+def _in_words(message: Message) -> str:
+    if isinstance(message, SampleReport):
+        flags = "".join(
+            f" {word}" for word, on in (("missed", message.missed), ("limited", message.limited)) if on
+        )
+        return (
+            f"tick {message.tick:3}  {message.position_counts:8} counts  {message.voltage_mV:6} mV  "
+            f"{state_in_words(message)}{flags}"
+        )
+    if isinstance(message, FaultReport):
+        name = Fault(message.code).name if message.code in set(Fault) else f"code {message.code}"
+        return f"{name}  at tick {message.tick}  detail {message.detail}"
+    if isinstance(message, ParameterValue) and message.id in set(Parameter):
+        return f"{Parameter(message.id).name} = {message.value}  result {message.result}"
+    fields = message._asdict()
+    return "  ".join(f"{name} {int(value)}" for name, value in fields.items())

@@ -1,0 +1,41 @@
+"""`dcmp-hil ports`: what is plugged in, and what answers."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from dcmp_hil.cli import console
+
+
+def ports(
+    port: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PORT]...", help="Serial ports to look at besides, such as /dev/pts/3."),
+    ] = None,
+    baud: Annotated[int, typer.Option(metavar="BIT_S", help="Of serial ports.")] = 1_000_000,
+    bitrate: Annotated[int, typer.Option(metavar="BIT_S", help="Of CAN buses.")] = 1_000_000,
+) -> None:
+    """List serial ports and CAN channels, and the device on each.
+
+    It listens first and asks only where a device of this project is heard.
+    """
+    from rich.text import Text
+
+    from dcmp_hil.backends.discovery import find_devices
+    from dcmp_hil.clock import MonotonicClock
+
+    found = 0
+    for finding in find_devices(port or (), baud, bitrate, MonotonicClock()):
+        found += 1
+        console.out.print(Text.assemble((finding.place, "bold"), f"  {finding.description}"))
+        console.out.print(Text(f"    {finding.device}", "green" if finding.settings else "dim"))
+        if finding.settings:
+            keys = " ".join(f"--set backend.{key}" for key in finding.settings)
+            console.out.print(Text(f"    dcmp-hil run {keys}"))
+    if not found:
+        console.note(
+            "No serial port and no CAN channel here. `dcmp-hil device` makes a virtual one; name its port "
+            "to see it: dcmp-hil ports /dev/pts/N"
+        )

@@ -1,0 +1,3 @@
+"""Written by tools/protocol.py: what host and device compare before anything else."""
+
+PROTOCOL_HASH = 0x1356ECA1

@@ -1,0 +1,39 @@
+"""The pace of a simulation: tick n is at its own instant of whatever clock there is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dcmp_hil.clock import Clock
+
+_FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
+
+
+class Pace:
+    """Sleeps until ticks.
+
+    Parameters
+    ----------
+    clock
+        What to sleep on.
+    period
+        s.
+    """
+
+    def __init__(self, clock: Clock, period: float) -> None:
+        self._clock = clock
+        self._period_ns = 1e9 * period
+        self._start_ns = clock.now_ns()
+
+    def start(self) -> None:
+        """Make this instant that of tick 0."""
+        self._start_ns = self._clock.now_ns()
+
+    def wait_for(self, tick: int) -> None:
+        """Return no earlier than the instant of `tick`."""
+        deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
+        self._clock.sleep_until_ns(deadline_ns)
+        behind_ns = self._clock.now_ns() - deadline_ns
+        if behind_ns > _FORGIVEN_NS:
+            self._start_ns += behind_ns  # after a stop of the process: no burst of old periods
