@@ -1,0 +1,141 @@
+import pytest
+
+from tests.firmware.bench import CONFIG, SESSION, Bench, Core
+
+OK, UNKNOWN, READ_ONLY, OUT_OF_RANGE, NOT_IDLE, NOT_OWNER = range(6)
+TOP = (1 << 31) - 1
+BUILT = {
+    1: CONFIG["board"],
+    2: 7,
+    3: 1,
+    4: 0,
+    5: 4096,
+    6: 1000,
+    7: 10000,
+    8: 0,
+    9: 20,
+    10: 40000,
+    11: 20000,
+    12: 0,
+}
+RANGES = {7: (1, 10000), 8: (1, TOP), 9: (5, 50), 10: (1, 40000), 11: (1, 20000), 12: (0, 1)}
+
+
+def _set(bench: Bench, number: int, value: int, session: int = SESSION) -> tuple[int, int]:
+    answer = bench.ask("PARAMETER_SET", session=session, id=number, value=value)
+    assert answer["id"] == number
+    return answer["result"], answer["value"]
+
+
+@pytest.mark.parametrize("state", range(5))
+def test_get_in_every_state(core: Core, state: int) -> None:
+    for number in range(256):
+        bench = Bench(core, boot=state != 0)
+        bench.go_to(state)
+        answer = bench.ask("PARAMETER_GET", id=number)
+        value = bench.device.tick if number == 4 and state else BUILT.get(number, 0)
+        assert answer == {"id": number, "value": value, "result": OK if number in BUILT else UNKNOWN}
+
+
+@pytest.mark.parametrize("number", RANGES)
+def test_the_range(core: Core, number: int) -> None:
+    bench = Bench(core)
+    bench.hello()
+    low, high = RANGES[number]
+    for value in [high, low]:
+        assert _set(bench, number, value) == (OK, value)
+        assert bench.ask("PARAMETER_GET", id=number)["value"] == value
+        for outside in [low - 1, high + 1, -(1 << 31), TOP]:
+            if -(1 << 31) <= outside <= TOP and not low <= outside <= high:
+                assert _set(bench, number, outside) == (OUT_OF_RANGE, value)
+
+
+def test_a_slew_that_the_board_was_built_with_can_be_lowered_only(core: Core) -> None:
+    bench = Bench(core, slew_mV_per_ms=200)
+    bench.hello()
+    assert _set(bench, 8, 201) == (OUT_OF_RANGE, 200)
+    assert _set(bench, 8, 0) == (OUT_OF_RANGE, 200)
+    assert _set(bench, 8, 3) == (OK, 3)
+    assert _set(bench, 8, 200) == (OK, 200)
+
+
+def test_a_board_without_edge_stamps(core: Core) -> None:
+    bench = Bench(core, edge_stamps=False)
+    bench.hello()
+    assert _set(bench, 12, 1) == (OUT_OF_RANGE, 0)
+    assert _set(bench, 12, 0) == (OK, 0)
+
+
+def test_who_may_and_when(core: Core) -> None:
+    bench = Bench(core)
+    assert _set(bench, 9, 30, session=0) == (NOT_OWNER, 20)
+    assert _set(bench, 9, 30) == (NOT_OWNER, 20)
+    bench.hello()
+    assert _set(bench, 9, 30, session=9) == (NOT_OWNER, 20)
+    assert _set(bench, 0, 30) == (UNKNOWN, 0)
+    assert _set(bench, 13, 30) == (UNKNOWN, 0)
+    for number in range(1, 7):
+        assert _set(bench, number, BUILT[number]) == (READ_ONLY, BUILT[number])
+    for state in (2, 3, 4):
+        bench = Bench(core)
+        bench.go_to(state)
+        assert _set(bench, 9, 30) == (NOT_IDLE, 20)
+
+
+def test_the_first_reason_is_answered(core: Core) -> None:
+    bench = Bench(core)
+    bench.go_to(3)
+    assert _set(bench, 200, 0, session=9) == (UNKNOWN, 0)
+    assert _set(bench, 1, 0, session=9) == (READ_ONLY, 1)
+    assert _set(bench, 9, 0, session=9) == (OUT_OF_RANGE, 20)
+    assert _set(bench, 9, 30, session=9) == (NOT_IDLE, 20)
+
+
+def test_lowered_limits_hold(core: Core) -> None:
+    bench = Bench(core)
+    bench.hello()
+    assert _set(bench, 7, 2000) == (OK, 2000)
+    assert _set(bench, 8, 50) == (OK, 50)
+    assert _set(bench, 10, 1000) == (OK, 1000)
+    bench.arm()
+    for _ in range(60):
+        bench.drive(9000)
+        bench.tick()
+    assert bench.output() == (2000, True)
+    bench.counts += 3
+    bench.drive(0)
+    bench.tick()
+    assert bench.fault == (5, 3000)
+
+
+LIMITS = {
+    "period_us": (50, 100000),
+    "voltage_limit_mV": (1, 32767),
+    "slew_mV_per_ms": (0, TOP),
+    "watchdog_ms": (5, 50),
+    "speed_limit_counts_s": (1, TOP),
+    "travel_limit_counts": (1, TOP),
+    "node": (0, 15),
+    "counts_per_rev": (1, TOP),
+}
+
+
+@pytest.mark.parametrize("field", LIMITS)
+def test_a_configuration_outside_its_ranges(core: Core, field: str) -> None:
+    low, high = LIMITS[field]
+    for fine in (low, high):
+        assert Bench(core, boot=False, **{field: fine}).valid
+    for wrong in (low - 1, high + 1):
+        if wrong > TOP or (field == "node" and wrong < 0):
+            continue
+        bench = Bench(core, boot=False, **{field: wrong})
+        assert not bench.valid
+        bench.send("HELLO", session=1, protocol_hash=core.lib.check_protocol_hash())
+        bench.send("STOP", reason=0)
+        bench.corrupt(20)
+        core.lib.dcmp_device_link(bench.device, False, 0)
+        core.lib.dcmp_device_link(bench.device, True, 0)
+        for _ in range(200):
+            assert bench.tick() == (0, False)
+        assert bench.output() == (0, False)
+        assert bench.seen == []

@@ -1,0 +1,91 @@
+"""The firmware's core as a library: built by the C compiler, reached through cffi."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cffi import FFI
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = ROOT / "firmware" / "core"
+HERE = Path(__file__).resolve().parent
+DBC = ROOT / "firmware" / "proto" / "dcmp.dbc"
+
+PREBUILT = "DCMP_CORE_LIBRARY"
+"""Environment: a library that was built already, the sanitized or the counting one."""
+
+WARNINGS = [
+    *("-std=c11", "-ffreestanding", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow"),
+    *("-Wundef", "-Wstrict-prototypes", "-Werror"),
+]
+BUILDS = {
+    "plain": ["-O2"],
+    "sanitized": [
+        "-O1",
+        "-g",
+        "-fsanitize=address,undefined",
+        "-fno-sanitize-recover",
+        "-fno-omit-frame-pointer",
+    ],
+    "counted": ["-O0", "-g", "--coverage"],
+}
+
+
+def compiler() -> str:
+    """Return the C compiler; without one, skip, or fail where nothing may be missing."""
+    found = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
+    if found is None:
+        reason = "no C compiler here: apt install gcc"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return found
+
+
+def sources() -> list[Path]:
+    """Return the core's C files."""
+    return sorted(CORE.glob("*.c"))
+
+
+def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
+    """Compile the core and more files, each into an object of its own."""
+    objects = []
+    for source in [*sources(), *more]:
+        built = folder / f"{source.stem}.o"
+        command = [compiler(), *WARNINGS, *flags, "-fPIC", f"-I{CORE}", "-c", str(source), "-o", str(built)]
+        subprocess.run(command, check=True, cwd=folder)
+        objects.append(built)
+    return objects
+
+
+def build(folder: Path, kind: str) -> Path:
+    """Build the library of one kind."""
+    objects = compile_all(folder, BUILDS[kind], HERE / "core_checks.c")
+    library = folder / f"libcore_{kind}.so"
+    subprocess.run(
+        [compiler(), "-shared", *BUILDS[kind], *map(str, objects), "-o", str(library)], check=True, cwd=folder
+    )
+    return library
+
+
+@functools.cache
+def declarations() -> str:
+    """Return every declaration of the core, preprocessed without the system's headers, which cffi knows."""
+    command = [compiler(), "-E", "-P", "-nostdinc", f"-I{CORE}", f"-I{HERE}", f"-I{HERE / 'no_headers'}", "-"]
+    text = '#include "core_checks.h"\n'
+    return subprocess.run(command, check=True, input=text, capture_output=True, text=True).stdout
+
+
+def load(library: Path) -> tuple[FFI, Any]:
+    """Load a library; its structures are as large here as they are there."""
+    ffi = FFI()
+    ffi.cdef(declarations())
+    lib: Any = ffi.dlopen(str(library))
+    assert lib.check_device_size() == ffi.sizeof("struct dcmp_device")
+    return ffi, lib
