@@ -72,7 +72,7 @@ def test_libfuzzer(tmp_path: Path) -> None:
     if clang is None:
         pytest.skip("no clang here: apt install clang (gcc's own driver ran the same target)")
     probe = [clang, "-fsanitize=fuzzer", "-x", "c", "-", "-o", os.devnull]
-    target = "#include <stddef.h>\nint LLVMFuzzerTestOneInput(const unsigned char *d, size_t n) { return !d && n; }"
+    target = "int LLVMFuzzerTestOneInput(const unsigned char *d, unsigned long n) { return !d && n; }"
     if subprocess.run(probe, input=target, text=True, capture_output=True, check=False).returncode != 0:
         pytest.skip("clang has no libFuzzer here: apt install libclang-rt-dev")
     flags = ["-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
