@@ -10,15 +10,13 @@ from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import Encoder
 from sim_backend.pace import Pace
-from sim_backend.plant import EulerPlant, MoreauPlant, Plant
+from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-
-_PLANTS: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
 
 
 class SimBackend:
@@ -41,7 +39,7 @@ class SimBackend:
         self._pace = Pace(clock, rig.period)
         self._period = rig.period
         self._tick = 0
-        self._plant = _plant(rig)
+        self._plant = make_plant(rig)
         self._encoder = Encoder(
             rig.encoder.counts,
             phase=rig.sim.encoder_phase_counts,
@@ -100,10 +98,3 @@ class SimBackend:
     def live(self) -> bool:
         """Whether the amplifier is on; off, it puts out 0 V whatever it is told."""
         return self._amplifier.live
-
-
-def _plant(rig: Rig) -> Plant:
-    steps = rig.plant_steps
-    return _PLANTS[rig.sim.integrator](
-        rig.plant, rig.model.values(), position=rig.sim.position_rad, step=rig.period / steps, steps=steps
-    )

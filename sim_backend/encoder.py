@@ -31,7 +31,19 @@ class Encoder:
         """Return the measured position, rad."""
         if self._count is None:
             return position + self._random.gauss(0.0, self._noise) if self._noise else position
+        return self._count * (self.count(position) - self._phase)
+
+    def count(self, position: float) -> int:
+        """Return the counter at a position (rad), unwrapped; an ideal encoder has none.
+
+        Raises
+        ------
+        ValueError
+            If the encoder is ideal.
+        """
+        if self._count is None:
+            raise ValueError("an ideal encoder has no counts")
         counts = position / self._count + self._phase
         if self._noise:
             counts += self._random.gauss(0.0, self._noise)
-        return self._count * (math.floor(counts + 0.5) - self._phase)
+        return math.floor(counts + 0.5)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from dcmp_hil.values import Truth
 
 if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
     from dcmp_hil.model import Model
 
 
@@ -98,3 +99,12 @@ class EulerPlant:
         """Return w of eq. (2), rad/s2."""
         sign = math.copysign(1.0, x2) if x2 != 0.0 else 0.0
         return -self._plant.f1 * sign + self._plant.external(t) - self._plant.gravity * math.sin(x1)
+
+
+def make_plant(rig: Rig) -> Plant:
+    """Make the plant that a rig's `[sim]` and `[model]` describe."""
+    kinds: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
+    steps = rig.plant_steps
+    return kinds[rig.sim.integrator](
+        rig.plant, rig.model.values(), position=rig.sim.position_rad, step=rig.period / steps, steps=steps
+    )

@@ -1,0 +1,49 @@
+"""The firmware's shared library (firmware/boards/hostlib) as ctypes sees it."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+
+from sim_backend import firmware
+from sim_backend.board_config import LAYOUT
+
+CARRIERS = {"cobs": 0, "slcan": 1, "can": 2}
+"""By name; `can` gives records instead of bytes: identifier, length, 8 bytes of data."""
+RECORD = "<HB8s"
+
+VOLTAGE, ENABLE, STATE, FAULT, OWNER, LINK_UP, OUT_LENGTH, OUT_OFFSET = range(8)
+"""Indices of `struct hostlib_view`."""
+
+_FUNCTIONS = (
+    ("init", ctypes.c_bool, (ctypes.c_char_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_uint32)),
+    ("tick", None, (ctypes.c_uint32, ctypes.c_uint32)),
+    ("receive", None, (ctypes.c_char_p, ctypes.c_size_t, ctypes.c_uint32)),
+    ("receive_frame", None, (ctypes.c_uint16, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_uint32)),
+    ("look", None, (ctypes.c_uint32,)),
+    ("link", None, (ctypes.c_bool, ctypes.c_uint32)),
+)
+
+
+@functools.cache
+def load() -> ctypes.PyDLL:
+    """Compile the library if need be, and load it.
+
+    Its functions take about a microsecond and never wait: the interpreter's lock is kept over a call, which
+    also makes each of them one step for other threads.
+
+    Raises
+    ------
+    OpenError
+        If it cannot be compiled.
+    """
+    path = firmware.library()
+    library = ctypes.PyDLL(str(path))
+    for name, result, arguments in _FUNCTIONS:
+        function = getattr(library, f"hostlib_{name}")
+        function.restype, function.argtypes = result, (ctypes.c_void_p, *arguments)
+    for name in ("size", "config_size"):
+        getattr(library, f"hostlib_{name}").restype = ctypes.c_size_t
+    if library.hostlib_config_size() != LAYOUT.size:
+        raise AssertionError(f"{path}: struct dcmp_config is not what sim_backend.board_config says")
+    return library

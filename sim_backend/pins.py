@@ -1,0 +1,58 @@
+"""What a board's pins are connected to: the plant's encoder, and the amplifier's power stage."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dcmp_hil.values import Truth
+from sim_backend.amplifier import Amplifier
+from sim_backend.encoder import Encoder
+from sim_backend.plant import make_plant
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+
+_WORD = 0xFFFF_FFFF
+
+
+class Pins:
+    """The plant, wired as the rig says: a positive command may lower the arm, a rising arm count down.
+
+    Parameters
+    ----------
+    rig
+        Its `[sim]`, `[model]`, `[encoder]` and `[amplifier]` tables.
+    count_offset
+        Counts, what the encoder shows at 0 rad.
+    """
+
+    def __init__(self, rig: Rig, count_offset: int = 0) -> None:
+        self._plant = make_plant(rig)
+        self._encoder = Encoder(
+            rig.encoder.counts,
+            phase=rig.sim.encoder_phase_counts,
+            noise=rig.sim.encoder_noise_counts,
+            seed=rig.sim.seed,
+        )
+        self._stage = Amplifier(
+            limit=math.inf,  # clamp and slew are the firmware's
+            slew=math.inf,
+            dead_zone=rig.sim.dead_zone_V,
+            quantum=rig.sim.voltage_step_mV * 1e-3,
+            delay_samples=0,
+        )
+        self._stage.live = True
+        self._mV_per_V = rig.amplifier.sign * 1e3
+        self._encoder_sign = rig.encoder.sign
+        self._offset = count_offset
+        self.truth = Truth(rig.sim.position_rad, 0.0, math.nan)
+
+    def advance(self, voltage_mV: int) -> None:
+        """Hold what the firmware puts out, mV, for a period."""
+        self._stage.command(voltage_mV / self._mV_per_V)
+        self.truth = self._plant.advance(self._stage.step())
+
+    def count(self) -> int:
+        """Return what the encoder's counter shows, 32 bits."""
+        return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _WORD
