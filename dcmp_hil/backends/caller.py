@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backends.link import Link
     from dcmp_hil.clock import Clock
+    from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 
 _Answer = TypeVar("_Answer")
@@ -36,7 +37,6 @@ class Caller:
     def __init__(self, link: Link, clock: Clock, node: int) -> None:
         self._link, self._clock, self._node = link, clock, node
         self.sample: SampleReport | None = None  # the newest
-        self.samples = 0
         self.foreign = 0  # frames that are not this device's
         self.corrupt = 0  # frames whose crc8 was wrong
 
@@ -49,20 +49,9 @@ class Caller:
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             frame = self._link.receive(1e-9 * left_ns)
-            if frame is None:
-                continue
-            try:
-                message = unpack(frame, self._node)
-            except CorruptFrameError:
-                self.corrupt += 1
-                continue
-            if message is None:
-                self.foreign += 1
-                continue
-            if isinstance(message, SampleReport):
-                self.sample = message
-                self.samples += 1
-            return message
+            message = None if frame is None else self._understand(frame)
+            if message is not None:
+                return message
         return None
 
     def overhear(self, timeout: float) -> tuple[int, Message] | None:
@@ -79,8 +68,12 @@ class Caller:
         return None if message is None else (node, message)
 
     def hear_sample(self, timeout: float) -> SampleReport | None:
-        """Return the next SAMPLE; None after `timeout` (s)."""
-        return self._until(timeout, SampleReport, lambda _: True)
+        """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
+        sample = self._until(timeout, SampleReport, lambda _: True)
+        while (frame := self._link.receive(0.0)) is not None:
+            message = self._understand(frame)
+            sample = message if isinstance(message, SampleReport) else sample
+        return sample
 
     def ask(
         self, question: Message, answer: type[_Answer], fits: Callable[[_Answer], bool] = lambda _: True
@@ -92,6 +85,18 @@ class Caller:
             if found is not None:
                 return found
         return None
+
+    def _understand(self, frame: Frame) -> Message | None:
+        try:
+            message = unpack(frame, self._node)
+        except CorruptFrameError:
+            self.corrupt += 1
+            return None
+        if message is None:
+            self.foreign += 1
+        elif isinstance(message, SampleReport):
+            self.sample = message
+        return message
 
     def _until(self, timeout: float, kind: type[_Answer], fits: Callable[[_Answer], bool]) -> _Answer | None:
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)

@@ -11,7 +11,6 @@ import can
 import serial
 
 from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.backends.failures import cannot_open
 from dcmp_hil.backends.serial_link import path_of
 from dcmp_hil.backends.slcan_bus import SlcanBus
 from dcmp_hil.config.backends import Can as CanSettings
@@ -198,12 +197,9 @@ def _cannot_open(settings: CanSettings, error: BaseException) -> OpenError:
     cause = error
     while cause.__cause__ is not None:
         cause = cause.__cause__
-    if settings.interface == "slcan":
-        return cannot_open(str(settings.channel), cause)
     return OpenError(
-        f"{settings.interface} {settings.channel}: cannot be opened: {cause}. Check backend.channel and "
-        f"that the "
-        f"interface is up; for socketcan: ip link set {settings.channel} up type can bitrate "
+        f"{settings.interface} {settings.channel}: cannot be opened: {cause}. Check backend.channel and that "
+        f"the interface is up; for socketcan: ip link set {settings.channel} up type can bitrate "
         f"{settings.bitrate}."
     )
 

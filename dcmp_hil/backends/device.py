@@ -160,26 +160,26 @@ class DeviceBackend:
         while newest is None:
             frame = receive(1e-9 * left_ns)
             if frame is not None:
-                newest = self._sample_in(frame)
+                newest = self._newer(frame, self._tick)
             left_ns = deadline_ns - self._clock.now_ns()
             if newest is None and left_ns <= 0:
                 self._give_up()
         while (frame := receive(0.0)) is not None:
-            newer = self._sample_in(frame)
+            newer = self._newer(frame, newest.tick)
             if newer is not None:
                 self.counters.skipped += 1
                 newest = newer
         return newest
 
-    def _sample_in(self, frame: Frame) -> SampleReport | None:
-        """Return the SAMPLE in a frame if it is newer than the last one; keep what else tells something."""
+    def _newer(self, frame: Frame, tick: int) -> SampleReport | None:
+        """Return the SAMPLE in a frame if it is later than `tick`; keep what else tells something."""
         try:
             message = unpack(frame, self._node)
         except CorruptFrameError:
             self.counters.corrupt += 1
             return None
         if type(message) is SampleReport:
-            if nearest(self._tick, message.tick, 8) > self._tick or message.state != _RUN:
+            if nearest(tick, message.tick, 8) > tick or message.state != _RUN:
                 return message
             self.counters.stale += 1
         elif type(message) is FaultReport:
@@ -214,9 +214,8 @@ class DeviceBackend:
     def _give_up(self) -> None:
         self._link.send(pack(Stop(StopReason.NO_SAMPLE), self._node))
         raise SampleTimeoutError(
-            f"{self._link.name}: no sample for {1e-6 * self._patience_ns:.0f} ms. The device's watchdog "
-            f"has taken the "
-            "amplifier to 0 V. Check cable and power of the device, then start again."
+            f"{self._link.name}: no sample for {1e-6 * self._patience_ns:.0f} ms. The device's watchdog has "
+            "taken the amplifier to 0 V. Check cable and power of the device, then start again."
         )
 
     def _leave(self, error: BaseException | None) -> None:
@@ -224,9 +223,10 @@ class DeviceBackend:
         goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms, self._tick)
         if isinstance(error, TripError):
             caller.say(Stop(StopReason.SUPERVISOR))
-        if not goodbye.run():
+        if isinstance(error, BackendError):
+            goodbye.say_only()  # nobody to wait for
+        elif not goodbye.run():
             raise LinkError(
-                f"{self._link.name}: the device did not confirm 0 V. Its watchdog acts after "
-                f"{self._ttl_ms} ms "
-                "without a command; look at the amplifier before you touch the arm."
+                f"{self._link.name}: the device did not confirm 0 V. Its watchdog acts after {self._ttl_ms} "
+                "ms without a command; look at the amplifier before you touch the arm."
             )

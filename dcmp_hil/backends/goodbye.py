@@ -38,9 +38,13 @@ class Goodbye:
         self._session, self._ttl_ms = session, ttl_ms
         self._tick = tick
 
+    def say_only(self) -> None:
+        """Disarm without waiting for the echo."""
+        self._say(release=False)
+
     def run(self) -> bool:
         """Say goodbye; True if the device confirmed 0 V, disarmed."""
-        self._say(release=False)  # at once: a sample may be a period away
+        self.say_only()  # at once: a sample may be a period away
         deadline_ns = self._clock.now_ns() + _PATIENCE_NS
         answered = 1
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:

@@ -1,14 +1,19 @@
-"""python-can's slcan bus, its parser replaced: that one is deaf for ever after one byte that is no ASCII."""
+"""An slcan adapter as a bus of python-can: alone on its port, strict, never waiting.
+
+python-can's own is deaf for ever after one byte that is no ASCII, waits for every write, and speaks to a port
+before it could know that somebody else has it.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
 import can
-from can.interfaces.slcan import slcanBus
 
-from dcmp_hil.backends.serial_link import write_now
+from dcmp_hil.backends.serial_link import FAILURES, open_port, write_now
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import slcan
 from dcmp_hil.wire.frame import Frame
 
@@ -16,10 +21,16 @@ if TYPE_CHECKING:
     import serial
 
 _CHUNK = 4096
+_BITRATES = {
+    rate: code
+    for code, rate in enumerate(
+        (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 750_000, 1_000_000)
+    )
+}
 
 
-class SlcanBus(slcanBus):
-    """An slcan adapter whose damaged lines are dropped and counted, and whose writes never block.
+class SlcanBus(can.BusABC):
+    """An slcan adapter whose damaged lines are dropped and counted.
 
     Parameters
     ----------
@@ -30,31 +41,51 @@ class SlcanBus(slcanBus):
     bitrate
         Of the bus, bit/s.
     options
-        For python-can's bus.
+        For python-can.
+
+    Raises
+    ------
+    OpenError
+        If the port cannot be opened.
+    ConfigError
+        If slcan has no such bit rate.
     """
 
     def __init__(self, path: str, baud: int, bitrate: int, **options: Any) -> None:
+        if bitrate not in _BITRATES:
+            raise ConfigError(
+                f"backend.bitrate: got {bitrate}; slcan has {', '.join(map(str, _BITRATES))} bit/s."
+            )
         self._receiver = slcan.Receiver()
         self._frames: deque[Frame] = deque()
-        options.setdefault("sleep_after_open", 0.0)
-        super().__init__(path, tty_baudrate=baud, bitrate=bitrate, timeout=0, **options)
-        self._port.exclusive = True
+        self._port: serial.Serial = open_port(path, baud)
+        self.channel_info = f"slcan {path}"
+        for command in ("", "C", f"S{_BITRATES[bitrate]}", "O"):  # the empty one ends what came before
+            self._command(command)
+        super().__init__(path, **options)
 
     @property
     def corrupt(self) -> int:
         """Lines so far that were no frame."""
         return self._receiver.corrupt
 
-    @property
-    def _port(self) -> serial.Serial:
-        return self.serialPortOrig
-
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - never waits
         """Send a frame; what the port has no room for is dropped."""
         write_now(self._port, slcan.encode(Frame(msg.arbitration_id, bytes(msg.data))))
 
-    def _write(self, string: str) -> None:
-        write_now(self._port, string.encode() + self.LINE_TERMINATOR)
+    def fileno(self) -> int:
+        """Return the descriptor of the port, to wait on."""
+        return self._port.fileno()
+
+    def shutdown(self) -> None:
+        """Close the channel and the port."""
+        super().shutdown()
+        with contextlib.suppress(*FAILURES):  # it is gone: that is closed
+            self._command("C")
+        self._port.close()
+
+    def _command(self, command: str) -> None:
+        write_now(self._port, command.encode() + b"\r")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002
         if not self._frames:

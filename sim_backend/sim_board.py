@@ -1,0 +1,113 @@
+"""The backend `sim-board`: host wire code, the firmware's own C and the plant, in one process."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.config.backends import SimBoard
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.frame import Frame
+from sim_backend.board import Board
+from sim_backend.pace import Pace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.values import Truth
+
+_CARRIERS = {"cobs": cobs, "slcan": slcan}
+
+
+class SimBoardBackend(DeviceBackend):
+    """A device that is the firmware's core in this process.
+
+    Deterministic to the bit under a SimulatedClock, like the plain simulated rig; the bytes are real.
+
+    Parameters
+    ----------
+    rig
+        `[sim]` too.
+    clock
+        What paces the board.
+    board
+        One made already; by default a new one.
+    """
+
+    simulated = True
+
+    def __init__(self, rig: Rig, clock: Clock, board: Board | None = None) -> None:
+        if not isinstance(rig.backend, SimBoard):
+            raise ConfigError(f'backend.kind: got "{rig.backend.kind}"; expected "sim-board".')
+        self.board = board or Board(rig, carrier=rig.backend.carrier)
+        super().__init__(rig, BoardLink(self.board, rig.backend.carrier, Pace(clock, rig.period)), clock)
+
+    def truth(self) -> Truth:
+        """Return the true state at the last sample."""
+        return self.board.truth()
+
+
+class BoardLink:
+    """Frames to and from a board, through the bytes of a carrier; waiting for one is what makes it tick.
+
+    Parameters
+    ----------
+    board
+        Made for the same carrier.
+    carrier
+        `cobs`, `slcan` or `can`.
+    pace
+        Of its ticks.
+    """
+
+    name = "sim-board"
+
+    def __init__(self, board: Board, carrier: str, pace: Pace) -> None:
+        self._board, self._pace = board, pace
+        self._ticks = 0
+        self._frames: deque[Frame] = deque()
+        self._receiver = _CARRIERS[carrier].Receiver() if carrier in _CARRIERS else None
+        self._encode: Callable[[Frame], bytes] | None = (
+            _CARRIERS[carrier].encode if carrier in _CARRIERS else None
+        )
+
+    @property
+    def corrupt(self) -> int:
+        """What arrived so far and was no frame."""
+        return self._receiver.corrupt if self._receiver else 0
+
+    def open(self) -> None:
+        """Start the pace."""
+        self._pace.start()
+        self._ticks = 0
+
+    def close(self) -> None:
+        """Do nothing: the board stops with whoever made it tick."""
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame to the board."""
+        if self._encode is None:
+            self._board.receive_frame(*frame)
+        else:
+            self._board.receive(self._encode(frame))
+
+    def receive(self, timeout: float) -> Frame | None:
+        """Return the next frame; where there is none and time to wait, the board ticks first."""
+        frames = self._frames
+        if not frames and timeout > 0.0:
+            self._ticks += 1
+            self._pace.wait_for(self._ticks)
+            self._board.tick()
+        if not frames:
+            self._fetch()
+        return frames.popleft() if frames else None
+
+    def _fetch(self) -> None:
+        if self._receiver is None:
+            self._frames.extend(Frame(*frame) for frame in self._board.transmit_frames())
+        elif data := self._board.transmit():
+            self._frames.extend(self._receiver.feed(data))

@@ -1,0 +1,35 @@
+"""What a rig says of its device."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from dcmp_hil.backends.terms import Terms
+from dcmp_hil.errors import ConfigError
+from tests.helpers import bench
+
+
+def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
+    terms = Terms.of(
+        bench(
+            "backend.kind=serial",
+            "backend.port=/dev/null",
+            "backend.node=3",
+            "backend.watchdog_ms=15",
+            "loop.rate_hz=500",
+            "encoder.counts_per_rev=2000",
+            "encoder.sign=-1",
+            "encoder.zero=-7",
+            "amplifier.sign=-1",
+            "amplifier.voltage_limit_V=4.5",
+            "amplifier.slew_V_s=250",
+        )
+    )
+    assert terms == Terms(3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, -7)
+
+
+def test_terms_of_a_rig_without_a_wire_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"backend\.kind"):
+        Terms.of(bench())

@@ -1,0 +1,115 @@
+"""One bench for every way to a device: what the contract suite needs of each."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from dcmp_hil.backends import open_backend
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.clock import MonotonicClock, SimulatedClock
+from sim_backend.board import Board
+from sim_backend.sim_board import SimBoardBackend
+from tests.contract.pump import PtyPort, Pump, VirtualBus
+from tests.helpers import bench
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from dcmp_hil.backends import Backend
+    from dcmp_hil.config import Rig
+
+IN_PROCESS = ("sim-board cobs", "sim-board slcan", "sim-board can")
+PUMPED = ("can virtual", "slcan pty", "cobs pty")
+WIRED = (*IN_PROCESS, *PUMPED)
+ALL = ("sim", *WIRED)
+
+_channels = itertools.count()
+
+
+class PatientClock(MonotonicClock):
+    """The host's clock fifteen times as slow: what it calls 20 ms is long enough for a busy computer."""
+
+    @staticmethod
+    def now_ns() -> int:
+        return time.monotonic_ns() // 15
+
+
+class Bench:
+    """A rig and the board behind it.
+
+    Parameters
+    ----------
+    rig
+        With the `[backend]` that leads to the board.
+    board
+        None for the plain simulated rig.
+    make
+        Makes a backend: the first host, or a second one.
+    pump
+        Where there is a thread.
+    carrier
+        `cobs`, `slcan` or `can`.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        make: Callable[[], Backend],
+        board: Board | None = None,
+        pump: Pump | None = None,
+        carrier: str = "",
+    ) -> None:
+        self.rig, self.make, self.pump, self.carrier = rig, make, pump, carrier
+        self._board = board
+
+    @property
+    def board(self) -> Board:
+        """The board, on every bench that has one."""
+        assert self._board is not None
+        return self._board
+
+    def device(self) -> DeviceBackend:
+        """Make a backend that is a device on a wire."""
+        backend = self.make()
+        assert isinstance(backend, DeviceBackend)
+        return backend
+
+
+@contextmanager
+def on_bench(kind: str, *overrides: str, **of_board: int) -> Iterator[Bench]:
+    """Set up a bench; `of_board` is handed to Board, such as `count_offset`."""
+    if kind == "sim":
+        rig = bench(*overrides)
+        backend = open_backend(rig, SimulatedClock())
+        yield Bench(rig, lambda: backend)
+    elif kind in IN_PROCESS:
+        carrier = kind.removeprefix("sim-board ")
+        rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *overrides)
+        first = SimBoardBackend(rig, SimulatedClock(), Board(rig, carrier=carrier, **of_board))
+        yield Bench(rig, lambda: first, first.board, carrier=carrier)
+    else:
+        yield from _pumped(kind, overrides, of_board)
+
+
+def _pumped(kind: str, overrides: tuple[str, ...], of_board: dict[str, int]) -> Iterator[Bench]:
+    carrier = kind.split(maxsplit=1)[0]
+    way: tuple[str, ...]
+    if carrier == "can":
+        channel = f"contract-{next(_channels)}"
+        port: VirtualBus | PtyPort = VirtualBus(channel)
+        way = ("backend.kind=can", "backend.interface=virtual", f"backend.channel={channel}")
+    else:
+        port = PtyPort()
+        serial = ("backend.kind=serial", f"backend.port={port.path}")
+        slcan = ("backend.kind=can", "backend.interface=slcan", f"backend.channel={port.path}")
+        way = serial if carrier == "cobs" else slcan
+    rig = bench(*way, *overrides)
+    pump = Pump(Board(rig, carrier=carrier, **of_board), port)
+    pump.start()
+    try:
+        yield Bench(rig, lambda: open_backend(rig, PatientClock()), pump.board, pump, carrier)
+    finally:
+        pump.close()
