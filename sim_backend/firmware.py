@@ -13,48 +13,58 @@ from pathlib import Path
 from dcmp_hil.errors import OpenError
 
 _HERE = Path(__file__).parent
-_FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-ffp-contract=off")
+_PLACES = (_HERE / "firmware", _HERE.parent / "firmware")  # in the wheel; in a checkout
+_FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
 _SECONDS = 120
+_INSTALL = "apt install gcc libc6-dev"
 
 
 def library() -> Path:
-    """Return the core as a shared library (boards/hostlib).
+    """Return the core as a shared library (boards/hostlib); compile it if it is not there yet.
 
     Raises
     ------
     OpenError
         If there is no compiler, it fails, or the cache cannot be written.
     """
-    return _built("hostlib", "libdcmp.so", ("-shared", "-fPIC", "-fvisibility=default"))
+    return _built("hostlib", "libdcmp.so", ("-shared", "-fPIC", "-fvisibility=hidden"))
 
 
 def program() -> Path:
-    """Return the native board as a program (boards/native).
+    """Return the native board as a program (boards/native); compile it if it is not there yet.
 
     Raises
     ------
     OpenError
         If there is no compiler, it fails, or the cache cannot be written.
     """
-    return _built("native", "dcmp-native", ("-D_GNU_SOURCE",))
+    return _built("native", "dcmp-native", ("-D_XOPEN_SOURCE=700",))
 
 
 def sources() -> Path:
-    """Return the folder of the C sources: in the wheel beside this file, in a checkout at its top."""
-    return next(folder for folder in (_HERE / "firmware", _HERE.parent / "firmware") if folder.is_dir())
+    """Return the folder of the C sources.
+
+    Raises
+    ------
+    OpenError
+        If they were not installed.
+    """
+    for folder in _PLACES:
+        if (folder / "core").is_dir():
+            return folder
+    raise OpenError(f"{_PLACES[0]}: the firmware's sources are missing. Install dcmp-hil again.")
 
 
 def _built(board: str, name: str, flags: tuple[str, ...]) -> Path:
     root = sources()
     files = sorted([*root.glob("core/*.[ch]"), *root.glob(f"boards/{board}/*.[ch]")])
     compiler = _compiler()
-    key = hashlib.sha256(" ".join([*compiler, _version(compiler), *_FLAGS, *flags]).encode())
+    key = hashlib.sha256(repr((compiler, _version(compiler), _FLAGS, flags)).encode())
     for file in files:
-        key.update(file.name.encode() + b"\0" + file.read_bytes())
-    folder = _cache() / key.hexdigest()[:16]
-    target = folder / name
+        key.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    target = _cache() / key.hexdigest()[:16] / name
     if not target.exists():
-        _compile(compiler, flags, root, [file for file in files if file.suffix == ".c"], board, target)
+        _compile([*compiler, *_FLAGS, *flags, f"-I{root / 'core'}"], files, target)
     return target
 
 
@@ -64,51 +74,48 @@ def _compiler() -> list[str]:
         return asked
     found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
     if found is None:
-        raise OpenError("There is no C compiler to build the virtual device with: apt install gcc libc6-dev")
+        raise OpenError(f"The virtual device needs a C compiler, and there is none: {_INSTALL}")
     return [found]
 
 
 def _version(compiler: list[str]) -> str:
-    return _run([*compiler, "--version"], compiler)
+    return _run([*compiler, "--version"])
 
 
 def _cache() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "dcmp-hil"
+    base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    return Path(base) / "dcmp-hil"
 
 
-def _compile(
-    compiler: list[str], flags: tuple[str, ...], root: Path, files: list[Path], board: str, target: Path
-) -> None:
+def _compile(command: list[str], files: list[Path], target: Path) -> None:
     """Compile beside the target and rename: two processes at once do no harm."""
+    inputs = [str(file) for file in files if file.suffix == ".c"]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent) as folder:
             made = Path(folder) / target.name
-            includes = [f"-I{root / 'core'}", f"-I{root / 'boards' / board}"]
-            _run([*compiler, *_FLAGS, *flags, *includes, "-o", str(made), *map(str, files)], compiler)
+            _run([*command, "-o", str(made), *inputs])
             made.replace(target)
     except OSError as error:
         raise OpenError(
-            f"{target.parent}: {error.strerror or error}. The virtual device is built there; point "
+            f"{target.parent}: {error.strerror or error}. The virtual device is compiled there; point "
             "XDG_CACHE_HOME at a folder you may write in."
         ) from error
 
 
-def _run(command: list[str], compiler: list[str]) -> str:
+def _run(command: list[str]) -> str:
     try:
         done = subprocess.run(  # noqa: S603 - the compiler, with our own files
-            command, capture_output=True, text=True, timeout=_SECONDS, check=False
+            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_SECONDS, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise OpenError(
-            f"{compiler[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: "
-            "apt install gcc libc6-dev"
+            f"{command[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: {_INSTALL}"
         ) from error
     if done.returncode:
-        first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[-200:])
+        said = [line.strip() for line in done.stderr.splitlines() if "error" in line] or [done.stderr[-200:]]
         raise OpenError(
-            f"{compiler[0]}: the virtual device could not be compiled: {first.strip()} "
-            "If headers are missing: apt install gcc libc6-dev"
+            f"{command[0]}: the virtual device does not compile: {said[0]}. "
+            f"If it is a header that is missing: {_INSTALL}"
         )
     return done.stdout

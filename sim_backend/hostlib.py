@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 
+from dcmp_hil.errors import OpenError
 from sim_backend import firmware
 from sim_backend.board_config import LAYOUT
 
@@ -35,10 +36,16 @@ def load() -> ctypes.PyDLL:
     Raises
     ------
     OpenError
-        If it cannot be compiled.
+        If it cannot be compiled or loaded.
     """
     path = firmware.library()
-    library = ctypes.PyDLL(str(path))
+    try:
+        library = ctypes.PyDLL(str(path))
+    except OSError as error:
+        raise OpenError(
+            f"{path}: cannot be loaded ({error}). Delete {path.parent} to have it made again, or point "
+            "XDG_CACHE_HOME at a folder that programs may be started from."
+        ) from error
     for name, result, arguments in _FUNCTIONS:
         function = getattr(library, f"hostlib_{name}")
         function.restype, function.argtypes = result, (ctypes.c_void_p, *arguments)

@@ -1,0 +1,25 @@
+/* A pseudo terminal's master as the board's end of a serial line. */
+#ifndef PTY_H
+#define PTY_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+/* Returns the master, non-blocking, its other end raw and open to nobody; -1 with errno set. */
+int pty_open(void);
+
+/* Whether somebody has the other end open. */
+bool pty_in_use(int master);
+
+/* Returns how many bytes were read, 0 if there are none, -1 if the other end has been closed. */
+ssize_t pty_read(int master, uint8_t *bytes, size_t room);
+
+/* Never waits; false if not all of it fitted. */
+bool pty_write(int master, const uint8_t *bytes, size_t length);
+
+/* Forget what is under way in both directions. */
+void pty_flush(int master);
+
+#endif

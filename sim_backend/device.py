@@ -1,0 +1,289 @@
+"""A virtual device: the firmware as a process behind a pseudo terminal, with the simulated plant."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+import subprocess
+import threading
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+from dcmp_hil.errors import BackendError, ConfigError, LinkError, OpenError
+from sim_backend import firmware
+from sim_backend.board_config import NATIVE, board_config
+from sim_backend.pace import Pace
+from sim_backend.pins import Pins
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
+    from dcmp_hil.values import Truth
+
+_TICK = struct.Struct("<IIHBx")  # firmware/boards/native/plant_port.h
+_OUTPUT = struct.Struct("<IIhBBHBB")
+_PLANT_TIME, _UNASKED, _LINK_UP = 1, 1, 2
+_LIVE = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE
+_BRISK_MS = 2  # wall: how long a tick in plant time waits for a host that does not drive
+_ANSWER_S = 10.0  # wall: the process is gone if it takes longer
+_END_S = 2.0
+_KEPT = 10_000
+_WORD = 0xFFFF_FFFF
+
+
+class Output(NamedTuple):
+    """What the firmware told the plant."""
+
+    now_us: int  # by the firmware's clock
+    since_us: int  # when the output became what it is
+    voltage_mV: int
+    enable: int
+    state: int
+    owner: int
+    fault: int
+    flags: int
+
+    @property
+    def unasked(self) -> bool:
+        """Whether it changed between two ticks."""
+        return self.flags & _UNASKED != 0
+
+    @property
+    def link_up(self) -> bool:
+        """Whether a host has the port open."""
+        return self.flags & _LINK_UP != 0
+
+
+class VirtualDevice:
+    """A device that any program can open like a serial port.
+
+    A context manager: the process ends with it.
+
+    Parameters
+    ----------
+    rig
+        Its `[sim]`, `[model]`, `[encoder]`, `[amplifier]` and `[loop]` tables; it is wired as they say.
+    link
+        `cobs` or `slcan`.
+    clock
+        What paces its ticks. None: plant time, in which a tick is over as soon as the host has answered, and
+        nothing depends on how fast that was.
+    patience_ms
+        ms, wall: how long a tick in plant time waits for a host that drives.
+    symlink
+        A path that leads to the port, for as long as there is one.
+    count_offset
+        Counts, what the encoder shows where the arm is at 0 rad.
+    start_us
+        us, of the firmware's clock at the first tick.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        link: str = "cobs",
+        clock: Clock | None = None,
+        patience_ms: int = 50,
+        symlink: Path | None = None,
+        count_offset: int = 0,
+        start_us: int = 0,
+    ) -> None:
+        self._config = board_config(rig, NATIVE)
+        self._link, self._symlink, self._patience_ms = link, symlink, patience_ms
+        self._pace = None if clock is None else Pace(clock, rig.period)
+        self.pins = Pins(rig, count_offset)
+        self.now_us = start_us & _WORD
+        self.tick_count = 0
+        self.port = ""
+        self.output = Output(self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
+        self.log: deque[Output] = deque(maxlen=_KEPT)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._socket: socket.socket | None = None
+        self._changes = select.poll()
+        self._rest = b""
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+        self.error: BackendError | None = None  # what ended the thread
+
+    def __enter__(self) -> Self:
+        """Start the process.
+
+        Raises
+        ------
+        OpenError
+            If it cannot be compiled or started.
+        ConfigError
+            If the symlink cannot be made.
+        """
+        program = firmware.program()
+        ours, theirs = socket.socketpair()
+        fields = [f"{name}={value}" for name, value in self._config.items()]
+        arguments = ["--link", self._link, "--plant-fd", str(theirs.fileno()), *fields]
+        try:
+            self._process = subprocess.Popen(  # noqa: S603 - our own program
+                [program, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # Ctrl-C is for us; it ends when we hang up
+            )
+        except OSError as error:
+            ours.close()
+            raise OpenError(
+                f"{program}: {error.strerror or error}. Point XDG_CACHE_HOME at a folder that "
+                "programs may be started from."
+            ) from error
+        finally:
+            theirs.close()
+        ours.settimeout(_ANSWER_S)
+        self._changes.register(ours, select.POLLIN)
+        self._socket = ours
+        try:
+            self._learn_port(self._process)
+            self._make_symlink()
+        except BaseException:
+            self._end()
+            raise
+        if self._pace:
+            self._pace.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End thread and process; the port is gone then."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join(2.0 * _ANSWER_S)
+        self._remove_symlink()
+        self._end()
+
+    def start(self) -> None:
+        """Tick in a thread from now on, until the end."""
+        self._thread = threading.Thread(target=self._run, name="virtual-device", daemon=True)
+        self._thread.start()
+
+    def run_ticks(self, count: int) -> None:
+        """Let so many periods pass.
+
+        Raises
+        ------
+        LinkError
+            If the process ended, or does not answer.
+        """
+        for _ in range(count):
+            self._tick()
+
+    def truth(self) -> Truth:
+        """Return the true state at the last tick."""
+        return self.pins.truth
+
+    @property
+    def pid(self) -> int:
+        """Of the firmware's process."""
+        return self._process.pid if self._process else 0
+
+    def _run(self) -> None:
+        try:
+            while not self._ending.is_set():
+                self._tick()
+        except BackendError as error:
+            self.error = error
+
+    def _tick(self) -> None:
+        if self._pace:
+            self._pace.wait_for(self.tick_count)
+        if self.tick_count:
+            if self._changes.poll(0):
+                self._listen()
+            self.pins.advance(self.output.voltage_mV)
+            self.now_us = (self.now_us + self._config["period_us"]) & _WORD
+        self.tick_count += 1
+        wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _LIVE else _BRISK_MS
+        flags = 0 if self._pace else _PLANT_TIME
+        try:
+            self._plug().sendall(_TICK.pack(self.now_us, self.pins.count(), wait_ms, flags))
+        except OSError as error:
+            raise self._lost(error) from error
+        while not self._listen():
+            pass
+
+    def _listen(self) -> bool:
+        """Take what the firmware says; return whether an answer to a tick was among it."""
+        try:
+            data = self._plug().recv(4096)
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost(None)
+        data = self._rest + data
+        whole = len(data) - len(data) % _OUTPUT.size
+        self._rest = data[whole:]
+        outputs = [Output(*fields) for fields in _OUTPUT.iter_unpack(data[:whole])]
+        self.log.extend(outputs)
+        if outputs:
+            self.output = outputs[-1]
+        return any(not output.unasked for output in outputs)
+
+    def _plug(self) -> socket.socket:
+        if self._socket is None:
+            raise LinkError("The virtual device is not running. Use it as a context manager.")
+        return self._socket
+
+    def _lost(self, error: OSError | None) -> LinkError:
+        why = "does not answer" if isinstance(error, TimeoutError) else "has ended"
+        return LinkError(f"The firmware's process {self.pid} {why}. Start the virtual device again.")
+
+    def _learn_port(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None  # noqa: S101 - it was asked for
+        self.port = process.stdout.readline().decode().strip()
+        if not self.port:
+            said = process.communicate(timeout=_END_S)[1].decode().strip()
+            raise OpenError(f"The firmware's process did not start: {said}. Look at /dev/pts and /dev/ptmx.")
+
+    def _make_symlink(self) -> None:
+        link = self._symlink
+        if link is None:
+            return
+        try:
+            if link.is_symlink():
+                link.unlink()
+            link.symlink_to(self.port)
+        except OSError as error:
+            self._symlink = None  # not ours to take away
+            raise ConfigError(
+                f"--symlink {link}: {error.strerror or error}. Choose a path that is free, or a symlink, "
+                "in a folder you may write in."
+            ) from None
+
+    def _remove_symlink(self) -> None:
+        link = self._symlink
+        with contextlib.suppress(OSError):
+            if link is not None and str(link.readlink()) == self.port:
+                link.unlink()
+
+    def _end(self) -> None:
+        """Hang up, which ends the process; help it if it does not."""
+        plug, self._socket = self._socket, None
+        if plug is not None:
+            plug.close()
+        process, self._process = self._process, None
+        if process is None:
+            return
+        for help_it in (process.terminate, process.kill):
+            try:
+                process.wait(_END_S)
+                break
+            except subprocess.TimeoutExpired:
+                help_it()
+        process.wait(_END_S)
+        for pipe in (process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
