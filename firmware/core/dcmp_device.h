@@ -1,6 +1,7 @@
 /* The device: frames, time and counts in; frames, a voltage and ENABLE out. docs/protocol.md says what it does.
  *
- * Time is a free-running 32-bit microsecond counter that wraps; counts are the encoder's, modulo 2^24 or wider.
+ * Time is a free-running 32-bit microsecond counter that wraps; from call to call it must not step back, for that looks
+ * like a host that was silent for an hour. Counts are the encoder's, modulo 2^24 or wider.
  * Nothing here waits, allocates, or keeps anything outside the structure it is handed. */
 #ifndef DCMP_DEVICE_H
 #define DCMP_DEVICE_H
