@@ -11,6 +11,7 @@ import typer
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.check import check
+from dcmp_hil.cli.device import device
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, check, paper, replay, rigs, ports, monitor):
+for command in (run, check, paper, replay, device, rigs, ports, monitor):
     app.command()(command)
 
 

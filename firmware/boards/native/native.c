@@ -38,6 +38,8 @@ struct board {
     int master;
     int plant;
     bool link_up;
+    uint8_t rest[ROOM]; /* of frames that have begun to go out */
+    size_t rest_length;
     bool heard; /* a frame from the host, since the newest tick */
     bool inside; /* a frame that has begun */
     uint8_t frame_end;
@@ -127,11 +129,28 @@ static void tell_plant(const struct board *board, bool unasked)
 
 /* ------------------------------------------------------------------------------------------- link */
 
+/* Send the rest of what did not fit; true if there is none any more. */
+static bool send_rest(struct board *board)
+{
+    const size_t sent = pty_write(board->master, board->rest, board->rest_length);
+    board->rest_length -= sent;
+    memmove(board->rest, &board->rest[sent], board->rest_length);
+    return board->rest_length == 0u;
+}
+
+/* Frames go out whole or not at all: where a reader is slow, the end of one that has begun waits for room. */
 static void send(struct board *board, const uint8_t *bytes, size_t length)
 {
-    if (length > 0u && board->link_up && !pty_write(board->master, bytes, length)) {
-        dcmp_device_overrun(&board->device);
+    if (length == 0u || !board->link_up) {
+        return;
     }
+    if (!send_rest(board)) {
+        dcmp_device_overrun(&board->device);
+        return;
+    }
+    const size_t sent = pty_write(board->master, bytes, length);
+    board->rest_length = length - sent;
+    memcpy(board->rest, &bytes[sent], board->rest_length);
 }
 
 static void send_all(struct board *board)
@@ -162,6 +181,7 @@ static void link_closed(struct board *board)
 {
     board->link_up = false;
     dcmp_device_link(&board->device, false, now_us(board));
+    board->rest_length = 0;
     pty_flush(board->master); /* the next host is not to read what was meant for this one */
 }
 
@@ -256,7 +276,13 @@ static void serve(struct board *board)
 
 /* ------------------------------------------------------------------------------------------ start */
 
-static bool set_field(struct dcmp_config *config, const char *name, long value)
+static bool is(const char *argument, const char *name)
+{
+    const size_t length = strlen(name);
+    return strncmp(argument, name, length) == 0 && argument[length] == '=';
+}
+
+static bool take_field(struct dcmp_config *config, const char *argument)
 {
     const struct {
         const char *name;
@@ -273,32 +299,23 @@ static bool set_field(struct dcmp_config *config, const char *name, long value)
         {"speed_limit_counts_s", &config->speed_limit_counts_s},
         {"travel_limit_counts", &config->travel_limit_counts},
     };
+    const char *equals = strchr(argument, '=');
+    const long value = equals == NULL ? 0 : strtol(equals + 1, NULL, 10);
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
-        if (strcmp(name, fields[i].name) == 0) {
+        if (is(argument, fields[i].name)) {
             *fields[i].at = (int32_t)value;
             return true;
         }
     }
-    if (strcmp(name, "firmware_version") == 0) {
+    if (is(argument, "firmware_version")) {
         config->firmware_version = (uint16_t)value;
-    } else if (strcmp(name, "node") == 0) {
+        return true;
+    }
+    if (is(argument, "node")) {
         config->node = (uint8_t)value;
-    } else if (strcmp(name, "edge_stamps") == 0) {
-        config->edge_stamps = false; /* a plant port stamps nothing */
-    } else {
-        return false;
+        return true;
     }
-    return true;
-}
-
-static bool take_field(struct dcmp_config *config, char *argument)
-{
-    char *value = strchr(argument, '=');
-    if (value == NULL) {
-        return false;
-    }
-    *value++ = '\0';
-    return set_field(config, argument, strtol(value, NULL, 10));
+    return is(argument, "edge_stamps"); /* a plant port stamps nothing */
 }
 
 static bool take_carrier(struct options *options, const char *name)

@@ -61,9 +61,10 @@ ssize_t pty_read(int master, uint8_t *bytes, size_t room)
     return length < 0 && (errno == EAGAIN || errno == EINTR) ? 0 : -1;
 }
 
-bool pty_write(int master, const uint8_t *bytes, size_t length)
+size_t pty_write(int master, const uint8_t *bytes, size_t length)
 {
-    return write(master, bytes, length) == (ssize_t)length;
+    const ssize_t written = length > 0u ? write(master, bytes, length) : 0;
+    return written > 0 ? (size_t)written : 0u;
 }
 
 void pty_flush(int master)

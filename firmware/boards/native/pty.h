@@ -16,8 +16,8 @@ bool pty_in_use(int master);
 /* Returns how many bytes were read, 0 if there are none, -1 if the other end has been closed. */
 ssize_t pty_read(int master, uint8_t *bytes, size_t room);
 
-/* Never waits; false if not all of it fitted. */
-bool pty_write(int master, const uint8_t *bytes, size_t length);
+/* Never waits; returns how many bytes fitted. */
+size_t pty_write(int master, const uint8_t *bytes, size_t length);
 
 /* Forget what is under way in both directions. */
 void pty_flush(int master);

@@ -1,0 +1,101 @@
+"""`dcmp-hil device`: a device without hardware, behind a pseudo terminal."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+from contextlib import nullcontext
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.text import Text
+
+from dcmp_hil.cli import console
+from dcmp_hil.cli.options import Overrides, RigName
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from dcmp_hil.config import Rig
+
+_DEVICE = "sim_backend.device:VirtualDevice"
+_STATUS_S = 0.1  # between two looks at Ctrl-C, and two status lines
+_RIG = "bench-1khz"
+_RUN_WITH = {
+    "cobs": ("backend.kind=serial", "backend.port={port}"),
+    "slcan": ("backend.kind=can", "backend.interface=slcan", "backend.channel={port}"),
+}
+
+
+class LinkName(StrEnum):
+    """How frames travel on the port."""
+
+    COBS = "cobs"
+    SLCAN = "slcan"
+
+
+def device(
+    rig: RigName = _RIG,
+    overrides: Overrides = None,
+    link: Annotated[LinkName, typer.Option(help="How frames travel on the port.")] = LinkName.COBS,
+    symlink: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="A path that leads to the port, for as long as it is there."),
+    ] = None,
+) -> None:
+    """Run a device without hardware: the firmware's C as a process, the simulated plant on its pins.
+
+    The first line on standard output is the port, which a host opens as if it were a serial one. Ctrl-C
+    ends it.
+    """
+    from dcmp_hil.clock import MonotonicClock
+    from dcmp_hil.config import load_rig
+    from dcmp_hil.plugins import find_named
+
+    loaded = load_rig(rig, overrides or ())
+    make = find_named(_DEVICE, "device")
+    with make(loaded, link=link.value, clock=MonotonicClock(), symlink=symlink) as running:
+        port = str(symlink or running.port)
+        typer.echo(port)  # flushed: whoever waits for it reads a pipe
+        keys = [key.format(port=port) for key in _RUN_WITH[link]]
+        console.note(shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
+        ended_by = _keep_running(running, loaded)
+    raise typer.Exit(ended_by)
+
+
+def _run_command(rig: str, overrides: list[str]) -> list[str]:
+    named = [] if rig == _RIG else [rig]
+    return ["dcmp-hil", "run", *named, *(part for key in overrides for part in ("--set", key))]
+
+
+def _keep_running(running: Any, rig: Rig) -> int:
+    """Tick until somebody asks for the end; return the exit code."""
+    from rich.live import Live
+
+    from dcmp_hil.endings import StopRequest
+
+    ticks = max(1, round(_STATUS_S / rig.period))
+    terminal = console.err.is_terminal
+    live = Live(console=console.err, auto_refresh=False, transient=True) if terminal else nullcontext()
+    with StopRequest() as stop, live as line:
+        while not stop.requested:
+            running.run_ticks(ticks)
+            if line is not None:
+                line.update(_status(running), refresh=True)
+    return 0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal
+
+
+def _status(running: Any) -> Text:
+    from dcmp_hil.wire.messages import State
+
+    output = running.output
+    port = "open" if output.link_up else "closed"
+    host = f"session {output.owner:04x}" if output.owner else "no session"
+    return Text(
+        f"tick {running.tick_count:9}  {port:6}  {State(output.state).name:6}  "
+        f"{host:12}  {1e-3 * output.voltage_mV:+7.3f} V  {running.truth().position:+7.3f} rad",
+        no_wrap=True,
+        overflow="crop",
+    )
