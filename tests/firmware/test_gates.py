@@ -26,6 +26,7 @@ def _run_core_tests(library: Path, **more: str) -> None:
         "-m",
         "pytest",
         "-q",
+        "-s",
         "-p",
         "no:cacheprovider",
         "-p",
