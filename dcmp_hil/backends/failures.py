@@ -23,11 +23,9 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
     path
         Of the port.
     error
-        What the library raised; its `errno` is looked at, and the first argument if it has none.
+        What the library raised.
     """
-    number = getattr(error, "errno", None)
-    if number is None and error.args and isinstance(error.args[0], int):  # termios.error
-        number = error.args[0]
+    number = _number_of(error)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return OpenError(
             f"{path}: there is no such port. Plug the device in; `dcmp-hil ports` lists what is there."
@@ -44,6 +42,18 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
     if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):
         return OpenError(f"{path}: no serial port. `dcmp-hil ports` lists those that are.")
     return OpenError(f"{path}: cannot be opened: {error}. `dcmp-hil ports` lists what is there.")
+
+
+def _number_of(error: BaseException | None) -> int | None:
+    """Return the errno of an error, or of the one that it was raised in place of."""
+    while error is not None:
+        number = getattr(error, "errno", None)
+        if number is None and error.args:
+            number = error.args[0]  # where termios.error has it
+        if isinstance(number, int):
+            return number
+        error = error.__cause__ or error.__context__
+    return None
 
 
 def holder(path: str) -> str:

@@ -68,6 +68,10 @@ class RunFolder:
         except (OSError, ConfigError) as error:
             console.warn(f"{self.path} is incomplete: {error}")
 
+    def discard(self) -> None:
+        """Remove the folder of a run that never began."""
+        shutil.rmtree(self.path, ignore_errors=True)
+
     def tell(self, record: Path | None, *, live: bool) -> None:
         """Say where things are and how to look at them."""
         console.note(f"kept in {self.path}/")

@@ -116,6 +116,10 @@ def _conclude(
 ) -> None:
     """Print and keep the figures, however the run ended."""
     result = session.result()
+    if not result.summary.periods and options.window_from == 0.0:  # it never began, and the error says why
+        if folder is not None:
+            folder.discard()
+        return
     document: dict[str, Any] = {
         **asdict(result.summary),
         "rig": session.rig.name,
