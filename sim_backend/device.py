@@ -181,6 +181,19 @@ class VirtualDevice:
         for _ in range(count):
             self._tick()
 
+    def wait_for_change(self, seconds: float) -> bool:
+        """Wait until the firmware's output changes between two ticks; return whether it did.
+
+        Raises
+        ------
+        LinkError
+            If the process ended.
+        """
+        if not self._changes.poll(1e3 * seconds):
+            return False
+        self._listen()
+        return True
+
     def truth(self) -> Truth:
         """Return the true state at the last tick."""
         return self.pins.truth
@@ -201,8 +214,7 @@ class VirtualDevice:
         if self._pace:
             self._pace.wait_for(self.tick_count)
         if self.tick_count:
-            if self._changes.poll(0):
-                self._listen()
+            self.wait_for_change(0.0)
             self.pins.advance(self.output.voltage_mV)
             self.now_us = (self.now_us + self._config["period_us"]) & _WORD
         self.tick_count += 1
