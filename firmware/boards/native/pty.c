@@ -67,7 +67,12 @@ size_t pty_write(int master, const uint8_t *bytes, size_t length)
     return written > 0 ? (size_t)written : 0u;
 }
 
+/* What has been written lies at the other end already: only from there it can be thrown away. */
 void pty_flush(int master)
 {
-    tcflush(master, TCIOFLUSH);
+    const int slave = open(ptsname(master), O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (slave >= 0) {
+        tcflush(slave, TCIFLUSH);
+        close(slave);
+    }
 }

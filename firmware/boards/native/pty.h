@@ -19,7 +19,7 @@ ssize_t pty_read(int master, uint8_t *bytes, size_t room);
 /* Never waits; returns how many bytes fitted. */
 size_t pty_write(int master, const uint8_t *bytes, size_t length);
 
-/* Forget what is under way in both directions. */
+/* Forget what was written and not read, when nobody has the other end open. */
 void pty_flush(int master);
 
 #endif
