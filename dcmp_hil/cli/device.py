@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.endings import StopRequest
 
 _DEVICE = "sim_backend.device:VirtualDevice"
 _STATUS_S = 0.1  # between two looks at Ctrl-C, and two status lines
@@ -52,17 +53,21 @@ def device(
     """
     from dcmp_hil.clock import MonotonicClock
     from dcmp_hil.config import load_rig
+    from dcmp_hil.endings import StopRequest
     from dcmp_hil.plugins import find_named
 
     loaded = load_rig(rig, overrides or ())
     make = find_named(_DEVICE, "device")
-    with make(loaded, link=link.value, clock=MonotonicClock(), symlink=symlink) as running:
+    with (
+        StopRequest() as stop,
+        make(loaded, link=link.value, clock=MonotonicClock(), symlink=symlink) as running,
+    ):
         port = str(symlink or running.port)
         typer.echo(port)  # flushed: whoever waits for it reads a pipe
         keys = [key.format(port=port) for key in _RUN_WITH[link]]
         console.note(shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
-        ended_by = _keep_running(running, loaded)
-    raise typer.Exit(ended_by)
+        _keep_running(running, loaded, stop)
+    raise typer.Exit(0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal)
 
 
 def _run_command(rig: str, overrides: list[str]) -> list[str]:
@@ -70,21 +75,18 @@ def _run_command(rig: str, overrides: list[str]) -> list[str]:
     return ["dcmp-hil", "run", *named, *(part for key in overrides for part in ("--set", key))]
 
 
-def _keep_running(running: Any, rig: Rig) -> int:
-    """Tick until somebody asks for the end; return the exit code."""
+def _keep_running(running: Any, rig: Rig, stop: StopRequest) -> None:
+    """Tick until somebody asks for the end."""
     from rich.live import Live
-
-    from dcmp_hil.endings import StopRequest
 
     ticks = max(1, round(_STATUS_S / rig.period))
     terminal = console.err.is_terminal
     live = Live(console=console.err, auto_refresh=False, transient=True) if terminal else nullcontext()
-    with StopRequest() as stop, live as line:
+    with live as line:
         while not stop.requested:
             running.run_ticks(ticks)
             if line is not None:
                 line.update(_status(running), refresh=True)
-    return 0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal
 
 
 def _status(running: Any) -> Text:
