@@ -24,28 +24,27 @@ class CorruptFrameError(ValueError):
 _crc = crc8.autosar
 _new = tuple.__new__  # a third of the time of a NamedTuple's own
 _COUNTS = 0xFFFFFF  # 24 bits
-_SEQ, _ARM, _CLEAR, _RELEASE = 0x1FFF, 0x2000, 0x4000, 0x8000
+_ARM, _CLEAR, _RELEASE = 1, 2, 4
 _DRIVE, _SAMPLE = Struct("<hHHB"), Struct("<HBhBB")
 _EDGE, _IDENTITY = Struct("<HBHBb"), Struct("<IHB")
 
 
 def _pack_drive(drive: Drive) -> bytes:
     voltage_mV, seq, arm, clear, release, session, ttl_ms = drive
-    if seq > _SEQ:
-        raise error(f"seq: {seq} is more than {_SEQ}")
+    shared = seq << 3
     if arm:
-        seq |= _ARM
+        shared |= _ARM
     if clear:
-        seq |= _CLEAR
+        shared |= _CLEAR
     if release:
-        seq |= _RELEASE
-    return _DRIVE.pack(voltage_mV, seq, session, ttl_ms)
+        shared |= _RELEASE
+    return _DRIVE.pack(voltage_mV, shared, session, ttl_ms)
 
 
 def _unpack_drive(data: bytes) -> Drive:
-    voltage_mV, seq, session, ttl_ms = _DRIVE.unpack_from(data)
-    arm, clear, release = bool(seq & _ARM), bool(seq & _CLEAR), bool(seq & _RELEASE)
-    return Drive(voltage_mV, seq & _SEQ, arm, clear, release, session, ttl_ms)
+    voltage_mV, shared, session, ttl_ms = _DRIVE.unpack_from(data)
+    arm, clear, release = bool(shared & _ARM), bool(shared & _CLEAR), bool(shared & _RELEASE)
+    return Drive(voltage_mV, shared >> 3, arm, clear, release, session, ttl_ms)
 
 
 def _pack_sample(sample: SampleReport) -> bytes:

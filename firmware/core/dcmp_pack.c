@@ -21,9 +21,9 @@ void dcmp_pack_stop(struct dcmp_frame *frame, uint8_t node, const struct dcmp_st
 
 void dcmp_pack_drive(struct dcmp_frame *frame, uint8_t node, const struct dcmp_drive *drive)
 {
-    const uint32_t flags = bit(drive->arm, 13) | bit(drive->clear, 14) | bit(drive->release, 15);
+    const uint32_t flags = bit(drive->arm, 0) | bit(drive->clear, 1) | bit(drive->release, 2);
     put(&frame->data[0], (uint16_t)drive->voltage_mV, 2);
-    put(&frame->data[2], (drive->seq & 0x1FFFu) | flags, 2);
+    put(&frame->data[2], ((uint32_t)(drive->seq & 0x1FFFu) << 3) | flags, 2);
     put(&frame->data[4], drive->session, 2);
     put(&frame->data[6], drive->ttl_ms, 1);
     dcmp_seal(frame, DCMP_DRIVE, node);

@@ -1,6 +1,6 @@
 #ifndef DCMP_PROTOCOL_HASH_H
 #define DCMP_PROTOCOL_HASH_H
 
-#define DCMP_PROTOCOL_HASH 0x1356eca1u
+#define DCMP_PROTOCOL_HASH 0xe7933026u
 
 #endif

@@ -47,6 +47,9 @@ enum dcmp_verdict dcmp_session_judge(struct dcmp_session *session, const struct 
     if (drive->ttl_ms < DCMP_TTL_MIN_MS || drive->ttl_ms > DCMP_TTL_MAX_MS) {
         return DCMP_DROPPED;
     }
+    if ((int)drive->arm + (int)drive->clear + (int)drive->release > 1) {
+        return DCMP_DROPPED; /* no host says that; a damaged slcan line may */
+    }
     if (age > oldest) {
         return DCMP_GAP;
     }

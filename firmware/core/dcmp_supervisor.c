@@ -68,10 +68,10 @@ static enum dcmp_event classify(const struct dcmp_supervisor *supervisor, const 
     if (drive->release) {
         return DCMP_EVENT_RELEASE;
     }
-    if (drive->clear && !drive->arm && drive->voltage_mV == 0 && supervisor->lowered) {
+    if (drive->clear && drive->voltage_mV == 0 && supervisor->lowered) {
         return DCMP_EVENT_CLEAR;
     }
-    if (drive->clear || !drive->arm) {
+    if (!drive->arm) {
         return DCMP_EVENT_DISARM;
     }
     if (drive->voltage_mV != 0) {

@@ -12,11 +12,11 @@
 
 enum dcmp_event {
     DCMP_EVENT_TICK,
-    DCMP_EVENT_ARM,        /* DRIVE: arm, no clear, 0 V, close behind the one before */
+    DCMP_EVENT_ARM,        /* DRIVE: arm, 0 V, close behind the one before */
     DCMP_EVENT_ARM_LAST,   /* the same, and the tenth of its kind */
-    DCMP_EVENT_DRIVE,      /* DRIVE: arm, no clear, another voltage or further behind */
-    DCMP_EVENT_DISARM,     /* DRIVE: no arm, or clear */
-    DCMP_EVENT_CLEAR,      /* DRIVE: clear, no arm, 0 V, after one without clear */
+    DCMP_EVENT_DRIVE,      /* DRIVE: arm, another voltage or further behind */
+    DCMP_EVENT_DISARM,     /* DRIVE: no arm, nor a clear that counts */
+    DCMP_EVENT_CLEAR,      /* DRIVE: clear, 0 V, after one without clear */
     DCMP_EVENT_RELEASE,    /* DRIVE: release */
     DCMP_EVENT_SILENCE,    /* the watchdog */
     DCMP_EVENT_LINK_DOWN,

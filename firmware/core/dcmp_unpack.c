@@ -24,10 +24,10 @@ void dcmp_unpack_drive(const struct dcmp_frame *frame, struct dcmp_drive *drive)
 {
     const uint32_t shared = get(&frame->data[2], 2);
     drive->voltage_mV = (int16_t)get(&frame->data[0], 2);
-    drive->seq = (uint16_t)(shared & 0x1FFFu);
-    drive->arm = bit(shared, 13);
-    drive->clear = bit(shared, 14);
-    drive->release = bit(shared, 15);
+    drive->seq = (uint16_t)((shared >> 3) & 0x1FFFu);
+    drive->arm = bit(shared, 0);
+    drive->clear = bit(shared, 1);
+    drive->release = bit(shared, 2);
     drive->session = (uint16_t)get(&frame->data[4], 2);
     drive->ttl_ms = frame->data[6];
 }

@@ -78,7 +78,7 @@ def test_the_first_of_a_session_has_no_predecessor(core: Core) -> None:
     assert not bench.drive()
     assert bench.drive(seq=0) is False
     bench.tick()
-    assert bench.drive(release=1)
+    assert bench.drive(arm=0, release=1)
     bench.hello()
     assert bench.drive()
 
@@ -177,3 +177,15 @@ def test_the_first_sample(core: Core) -> None:
     assert bench.sample.pop("state") == 1
     assert bench.sample.pop("missed") == 1
     assert set(bench.sample.values()) == {0}
+
+
+@pytest.mark.parametrize("flags", [(1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)])
+def test_a_drive_whose_flags_contradict_each_other_is_dropped(
+    core: Core, flags: tuple[int, int, int]
+) -> None:
+    arm, clear, release = flags
+    bench = Bench(core)
+    bench.run()
+    bench.tick()
+    assert not bench.drive(arm=arm, clear=clear, release=release)
+    assert bench.drive()

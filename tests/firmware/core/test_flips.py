@@ -108,20 +108,63 @@ def _syndrome(*errors: tuple[int, int]) -> int:
     return fastcrc.crc8.autosar(bytes(9)) ^ fastcrc.crc8.autosar(b"\0\0" + damage[:7]) ^ damage[7]
 
 
-def test_every_flip_of_two_bits_that_passes_in_an_slcan_drive() -> None:
-    """For any DRIVE whatever: crc8 is linear, so the damage alone decides.
+DIGITS = "0123456789ABCDEF"
+STEPS = {
+    (old, new)
+    for old in range(16)
+    for new in range(16)
+    if (ord(DIGITS[old]) ^ ord(DIGITS[new])).bit_count() == 1
+}
+"""Hex digits that one flipped bit turns into one another."""
+YOUNG = 31  # periods; the device takes a DRIVE no older than 3 ms, 30 periods at 10 kHz
 
-    Two digits five apart, 8 in the first and 7 in the second. Session and age refuse all of them but the
-    first: 128 mV and `seq` one more or less (B and C), which passes only if the DRIVE before was lost or a
-    tick went by.
+
+def _may_be_accepted(first: int, x: int, second: int, y: int) -> bool:
+    """Whether some DRIVE of a host, damaged so in two digits, is a DRIVE that its device may accept.
+
+    Digits 0-3 are the voltage, 4-7 flags and seq, 8-11 the session, 12-13 the ttl, 14-15 crc8.
     """
-    digits = "0123456789ABCDEF"
-    one = {
-        index ^ digits.index(chr(ord(digit) ^ 1 << bit))
-        for index, digit in enumerate(digits)
-        for bit in range(8)
-        if chr(ord(digit) ^ 1 << bit) in digits
-    }
+    if any(8 <= digit < 12 for digit in (first, second)):
+        return False  # another session
+    for olds in [(a, b) for a, _ in STEPS for b, _ in STEPS if (a, a ^ x) in STEPS and (b, b ^ y) in STEPS]:
+        changes = dict(zip((first, second), zip(olds, (olds[0] ^ x, olds[1] ^ y), strict=True), strict=True))
+        if _word_may_be(changes) and _ttl_may_be(changes):
+            return True
+    return False
+
+
+def _word_may_be(changes: dict[int, tuple[int, int]]) -> bool:
+    """Look at every word of flags and seq that a host sends and these changes apply to."""
+    place = {4: 4, 5: 0, 6: 12, 7: 8}
+    inside = {place[digit]: change for digit, change in changes.items() if digit in place}
+    for word in range(1 << 16):
+        flags, seq = word & 7, word >> 3
+        if flags.bit_count() > 1 or any((word >> at) & 15 != old for at, (old, _) in inside.items()):
+            continue
+        damaged = word
+        for at, (old, new) in inside.items():
+            damaged ^= (old ^ new) << at
+        ahead = ((damaged >> 3) - seq + YOUNG) % 8192
+        if (damaged & 7).bit_count() <= 1 and ahead <= 2 * YOUNG:
+            return True
+    return False
+
+
+def _ttl_may_be(changes: dict[int, tuple[int, int]]) -> bool:
+    """Look at every ttl that a host sends and these changes apply to."""
+    inside = {(13 - digit) * 4: change for digit, change in changes.items() if digit in (12, 13)}
+    for ttl in range(5, 51):
+        damaged = ttl
+        for at, (old, new) in inside.items():
+            damaged = -1 if (ttl >> at) & 15 != old else damaged ^ (old ^ new) << at
+        if 5 <= damaged <= 50:
+            return True
+    return False
+
+
+def test_no_two_flipped_bits_in_an_slcan_drive_make_one_that_is_accepted() -> None:
+    """For any DRIVE whatever: crc8 is linear, so the damage alone decides whether it passes."""
+    one = {old ^ new for old, new in STEPS}
     assert all(_syndrome((at, error)) for at in range(16) for error in range(1, 16))
     passing = {
         (i, x, j, y)
@@ -132,3 +175,10 @@ def test_every_flip_of_two_bits_that_passes_in_an_slcan_drive() -> None:
         if _syndrome((i, x), (j, y)) == 0
     }
     assert passing == {(i, 8, i + 5, 7) for i in range(11)}
+    assert [damage for damage in sorted(passing) if _may_be_accepted(*damage)] == []
+
+
+def test_the_proof_sees_damage_that_would_be_accepted() -> None:
+    assert _may_be_accepted(0, 1, 1, 1)  # the voltage alone
+    assert _may_be_accepted(13, 1, 14, 1)  # 20 ms and 21
+    assert not _may_be_accepted(0, 1, 9, 1)

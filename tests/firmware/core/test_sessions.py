@@ -40,7 +40,7 @@ def test_stop_is_obeyed_from_anyone(core: Core) -> None:
 def test_release(core: Core) -> None:
     bench = Bench(core)
     bench.run()
-    assert bench.drive(5000, release=1)
+    assert bench.drive(5000, arm=0, release=1)
     assert bench.state == IDLE
     assert bench.output() == (0, False)
     assert bench.hello(9)["owned"] == 1
