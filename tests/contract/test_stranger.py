@@ -446,6 +446,8 @@ def test_a_fault_is_cleared_by_two_drives_of_one_session(ready: Host) -> None:
     assert after(session=THEIRS) == FAULTED
     assert after(clear=1, voltage_mV=1, session=THEIRS) == FAULTED
     assert after(clear=1, session=THEIRS) == IDLE
+    ready.send(wire.STOP, b"\0")
+    assert after(clear=1, session=THEIRS) == FAULTED  # each fault anew
 
 
 @pytest.mark.parametrize("sign", [1, -1])
