@@ -115,11 +115,10 @@ def test_run_against_it_in_real_time(cli: Callable[..., Outcome], tmp_path: Path
         return cli("run", *sets, "--duration", "0.3", "--no-record", "--viewer", "none")
 
     with running(tmp_path, "--set", "loop.rate_hz=100.0") as (process, port):
+        fits = against(port, "100.0")
+        for _ in range(4):  # a computer that is busy elsewhere may keep either side waiting for too long
+            fits = fits if fits.code == 0 else against(port, "100.0")
         other_rate = against(port, "200.0")
-        for _ in range(5):  # a computer that is busy elsewhere may keep either side waiting for too long
-            fits = against(port, "100.0")
-            if fits.code == 0:
-                break
         assert end(process, signal.SIGINT)[0] == 0
     assert fits.code == 0, fits.err
     assert "tracking error" in fits.out
