@@ -63,6 +63,7 @@ class Board:
         self._period_us = self._config["period_us"]
         self.now_us = start_us & _WORD
         self.tick_count = 0
+        self._c_tick, self._c_receive = lib.hostlib_tick, lib.hostlib_receive  # the two of every period
         self._boot(first_tick)
         self._out_at = self._view[hostlib.OUT_OFFSET]
 
@@ -72,11 +73,11 @@ class Board:
             self.pins.advance(self._view[_VOLTAGE])
             self.now_us = (self.now_us + self._period_us) & _WORD
         self.tick_count += 1
-        self._lib.hostlib_tick(self._at, self.now_us, self.pins.count())
+        self._c_tick(self._at, self.now_us, self.pins.count())
 
     def receive(self, data: bytes) -> None:
         """Hand bytes to the device, between two ticks."""
-        self._lib.hostlib_receive(self._at, data, len(data), self.now_us)
+        self._c_receive(self._at, data, len(data), self.now_us)
 
     def transmit(self) -> bytes:
         """Return the bytes that the device has sent."""

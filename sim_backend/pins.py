@@ -35,14 +35,7 @@ class Pins:
             noise=rig.sim.encoder_noise_counts,
             seed=rig.sim.seed,
         )
-        self._stage = Amplifier(
-            limit=math.inf,  # clamp and slew are the firmware's
-            slew=math.inf,
-            dead_zone=rig.sim.dead_zone_V,
-            quantum=rig.sim.voltage_step_mV * 1e-3,
-            delay_samples=0,
-        )
-        self._stage.live = True
+        self._stage = _power_stage(rig)
         self._mV_per_V = rig.amplifier.sign * 1e3
         self._encoder_sign = rig.encoder.sign
         self._offset = count_offset
@@ -50,9 +43,28 @@ class Pins:
 
     def advance(self, voltage_mV: int) -> None:
         """Hold what the firmware puts out, mV, for a period."""
-        self._stage.command(voltage_mV / self._mV_per_V)
-        self.truth = self._plant.advance(self._stage.step())
+        voltage = voltage_mV / self._mV_per_V
+        if self._stage is not None:
+            self._stage.command(voltage)
+            voltage = self._stage.step()
+        self.truth = self._plant.advance(voltage)
 
     def count(self) -> int:
         """Return what the encoder's counter shows, 32 bits."""
         return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _WORD
+
+
+def _power_stage(rig: Rig) -> Amplifier | None:
+    """Return what shapes the voltage beyond the board, if anything; clamp and slew are the firmware's."""
+    sim = rig.sim
+    if sim.dead_zone_V == 0.0 and sim.voltage_step_mV == 0.0:
+        return None
+    stage = Amplifier(
+        limit=math.inf,
+        slew=math.inf,
+        dead_zone=sim.dead_zone_V,
+        quantum=sim.voltage_step_mV * 1e-3,
+        delay_samples=0,
+    )
+    stage.live = True
+    return stage

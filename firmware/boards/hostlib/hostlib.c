@@ -40,8 +40,8 @@ API size_t hostlib_size(void);
 API size_t hostlib_config_size(void);
 API bool hostlib_init(struct hostlib *board, const struct dcmp_config *config, int32_t carrier, uint32_t now_us,
                       uint32_t first_tick);
-API void hostlib_receive(struct hostlib *board, const uint8_t *bytes, size_t length, uint32_t now_us);
-API void hostlib_receive_frame(struct hostlib *board, uint16_t id, const uint8_t *data, size_t length,
+API void hostlib_receive(struct hostlib *board, const uint8_t *bytes, uint32_t length, uint32_t now_us);
+API void hostlib_receive_frame(struct hostlib *board, uint32_t id, const uint8_t *data, uint32_t length,
                                uint32_t now_us);
 API void hostlib_tick(struct hostlib *board, uint32_t now_us, uint32_t counts);
 API void hostlib_look(struct hostlib *board, uint32_t now_us);
@@ -111,7 +111,7 @@ bool hostlib_init(struct hostlib *board, const struct dcmp_config *config, int32
     return valid;
 }
 
-void hostlib_receive(struct hostlib *board, const uint8_t *bytes, size_t length, uint32_t now_us)
+void hostlib_receive(struct hostlib *board, const uint8_t *bytes, uint32_t length, uint32_t now_us)
 {
     struct hostlib_view *view = &board->view;
     const size_t replied = dcmp_port_receive(&board->port, &board->device, bytes, length, now_us,
@@ -120,10 +120,10 @@ void hostlib_receive(struct hostlib *board, const uint8_t *bytes, size_t length,
     settle(board, dcmp_device_output(&board->device, now_us));
 }
 
-void hostlib_receive_frame(struct hostlib *board, uint16_t id, const uint8_t *data, size_t length, uint32_t now_us)
+void hostlib_receive_frame(struct hostlib *board, uint32_t id, const uint8_t *data, uint32_t length, uint32_t now_us)
 {
-    struct dcmp_frame frame = {.id = id, .length = (uint8_t)length};
-    for (size_t i = 0; i < length && i < DCMP_PAYLOAD_MAX; i++) {
+    struct dcmp_frame frame = {.id = (uint16_t)id, .length = (uint8_t)length};
+    for (uint32_t i = 0; i < length && i < DCMP_PAYLOAD_MAX; i++) {
         frame.data[i] = data[i];
     }
     dcmp_device_receive(&board->device, &frame, now_us);
