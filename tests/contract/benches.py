@@ -13,6 +13,7 @@ from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from sim_backend.board import Board
 from sim_backend.sim_board import SimBoardBackend
 from tests.contract.pump import PtyPort, Pump, VirtualBus
+from tests.contract.stranger_board import StrangerBoard
 from tests.helpers import bench
 
 if TYPE_CHECKING:
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from dcmp_hil.backends import Backend
     from dcmp_hil.config import Rig
 
-IN_PROCESS = ("sim-board cobs", "sim-board slcan", "sim-board can")
+IN_PROCESS = (
+    *("sim-board cobs", "sim-board slcan", "sim-board can"),
+    *("stranger cobs", "stranger slcan", "stranger can"),
+)
 PUMPED = ("can virtual", "slcan pty", "cobs pty")
 WIRED = (*IN_PROCESS, *PUMPED)
 ALL = ("sim", *WIRED)
@@ -86,9 +90,10 @@ def on_bench(kind: str, *overrides: str, **of_board: int) -> Iterator[Bench]:
         backend = open_backend(rig, SimulatedClock())
         yield Bench(rig, lambda: backend)
     elif kind in IN_PROCESS:
-        carrier = kind.removeprefix("sim-board ")
+        make, carrier = kind.split()
         rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *overrides)
-        first = SimBoardBackend(rig, SimulatedClock(), Board(rig, carrier=carrier, **of_board))
+        board = (Board if make == "sim-board" else StrangerBoard)(rig, carrier=carrier, **of_board)
+        first = SimBoardBackend(rig, SimulatedClock(), board)  # type: ignore[arg-type]
         yield Bench(rig, lambda: first, first.board, carrier=carrier)
     else:
         yield from _pumped(kind, overrides, of_board)

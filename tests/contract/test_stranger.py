@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import pytest
 
 from tests.contract import stranger_wire as wire
+from tests.contract.firmware_device import Firmware
 from tests.contract.stranger import Stranger
 from tests.contract.stranger_wire import ARMING, FAULTED, IDLE, RUN
 
@@ -163,7 +164,7 @@ class Host:
         return self.tick(moved)
 
 
-@pytest.fixture(params=[Stranger])
+@pytest.fixture(params=[Stranger, Firmware])
 def device(request: pytest.FixtureRequest) -> Callable[..., Device]:
     make: Callable[..., Device] = request.param
     return make
@@ -518,6 +519,8 @@ def test_link_down(running: Host) -> None:
 
 
 def test_a_blocked_link_never_brings_old_samples(ready: Host) -> None:
+    if isinstance(ready.device, Firmware):
+        pytest.skip("its library empties the device at every call; tests/firmware/core asks the core itself")
     for _ in range(20):
         ready.send(wire.GET, bytes([wire.TICK]))
     for _ in range(4):
