@@ -1,4 +1,4 @@
-"""The stranger's device with the simulated plant on its pins: a judge of the host that knows only the page."""
+"""The stranger's device with the plant on its pins: a judge of the host that knows only the page."""
 
 from __future__ import annotations
 
