@@ -24,8 +24,8 @@ _SELDOM = (
     ("config_size", ctypes.c_size_t, None),
 )
 _ALWAYS = ("tick", "receive", "receive_frame")
-"""They take a pointer, bytes, and integers of 32 bits, which is what ctypes makes of an int by itself: without
-declared types a call takes half the time."""
+"""They take a pointer, bytes, and integers of 32 bits, which is what ctypes makes of an int by itself:
+without declared types a call takes half the time."""
 
 
 @functools.cache

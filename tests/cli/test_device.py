@@ -90,6 +90,28 @@ def test_device_says_how_to_run_against_it(tmp_path: Path) -> None:
     assert f"{said}--set backend.interface=slcan --set backend.channel={port}" in err
 
 
+def test_terminal_is_shown_how_things_stand(tmp_path: Path) -> None:
+    screen, terminal = os.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dcmp_hil", "device", "--set", "sim.position_rad=1.25"],
+        cwd=tmp_path,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "120"},
+        stdout=subprocess.DEVNULL,
+        stderr=terminal,
+    )
+    os.close(terminal)
+    try:
+        shown = b""
+        while b" rad" not in shown and select.select([screen], [], [], _BOUND)[0]:
+            shown += os.read(screen, 4096)
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(_BOUND) == 0
+        os.close(screen)
+    for word in (b"tick", b"closed", b"IDLE", b"no session", b"+0.000 V", b" rad"):
+        assert word in shown
+
+
 def test_python_can_s_own_slcan_bus_hears_it(tmp_path: Path) -> None:
     with running(tmp_path, "--link", "slcan") as (process, port):
         with can.Bus(channel=port, interface="slcan", ignore_config=True, sleep_after_open=0.0) as bus:
