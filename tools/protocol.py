@@ -1,4 +1,4 @@
-"""`python -m tools.protocol`: write what follows from dcmp.dbc: tables of the page, the hash in Python and C."""
+"""`python -m tools.protocol`: write what follows from dcmp.dbc: tables of the page, the hash in Python, in C."""
 
 from __future__ import annotations
 
