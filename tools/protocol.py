@@ -1,4 +1,4 @@
-"""`python -m tools.protocol`: write what follows from dcmp.dbc: tables of the page, the hash in Python, in C."""
+"""`python -m tools.protocol`: write what follows from dcmp.dbc: tables of the page, and the hash."""
 
 from __future__ import annotations
 
