@@ -20,9 +20,10 @@ from dcmp_hil.observers import Setting
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Cycle, Sample
+from tools.bench_wire import codec_us, round_trips
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from dcmp_hil.config import Rig
     from dcmp_hil.observers import Observer
@@ -52,7 +53,10 @@ class _Nobody:
 
 
 def _row(what: str, unit: str, goal: str, measure: Callable[[], float]) -> Row:
-    values = [measure() for _ in range(_ROUNDS)]
+    return _row_of(what, [measure() for _ in range(_ROUNDS)], unit, goal)
+
+
+def _row_of(what: str, values: Sequence[float], unit: str, goal: str) -> Row:
     return Row(what, statistics.median(values), min(values), max(values), unit, goal)
 
 
@@ -116,8 +120,27 @@ def _rows() -> list[Row]:
         _row("run(), figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
         _row("super_twisting (R1), one step", "us", "<= 2", lambda: _step_us(lambda: SuperTwisting(setting))),
         _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
+        _row(
+            "sim-board: the same loop with wire and firmware, 200 us",
+            "x",
+            ">= 50",
+            lambda: _line_factor(load_rig("bench-1khz", ["backend.kind=sim-board"]), telemetry=False),
+        ),
+        _row("encode a DRIVE and decode a SAMPLE, COBS", "us", "<= 2", codec_us),
+        *_wire_rows(),
         _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
         _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
+    ]
+
+
+def _wire_rows() -> list[Row]:
+    """Round trips over a pseudo terminal: the ratio is of medians of the same run, taken in turn."""
+    firmware, echo = round_trips()
+    ratios = [one / other for one, other in zip(firmware, echo, strict=True)]
+    return [
+        _row_of("round trip to the native firmware, message to message", firmware, "us", ""),
+        _row_of("plain pyserial echo, as many bytes", echo, "us", ""),
+        _row_of("ratio of the two", ratios, "x", "<= 2"),
     ]
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
-from dcmp_hil.errors import ConfigError, OpenError
+from dcmp_hil.errors import BackendError, ConfigError, DcmpError
+from dcmp_hil.values import Fault
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
     Drive,
@@ -71,79 +74,69 @@ class Handshake:
         """
         self._listen()
         firmware = self._introduce()
-        self._compare()
-        self._check_round_trip()
-        self._clear()
-        self._set_limits()
-        self._arm()
+        try:
+            self._compare()
+            self._check_round_trip()
+            self._clear()
+            self._set_limits()
+            self._arm()
+        except DcmpError:
+            self._give_back()
+            raise
         return Greeting(self._session, self._tick, firmware)
 
+    def _give_back(self) -> None:
+        """Release the session, so that whoever tries next need not wait until it lapses."""
+        with contextlib.suppress(BackendError):
+            self._join_ticks()
+            self._say(release=True)
+
     def _listen(self) -> None:
-        caller, name = self._caller, self._link.name
+        caller = self._caller
         if caller.hear_sample(PATIENCE) is not None:
             return
         if self._link.corrupt or caller.corrupt:
-            raise OpenError(
-                f"{name}: something arrives, but no valid frame. Check the baud or bit rate (backend.baud, "
-                "backend.bitrate) and that the device is set to the same carrier."
-            )
+            raise refusals.only_damage(self._link.name)
         if caller.foreign:
-            raise OpenError(
-                f"{name}: frames arrive, but none from node {self._terms.node}. Check backend.node; "
-                "`dcmp-hil ports` lists who is there."
-            )
-        raise OpenError(
-            f"{name}: nothing arrives within {1e3 * PATIENCE:.0f} ms. Check that the device has power, "
-            f"that the "
-            "cable is the right one, and the rate; `dcmp-hil ports` lists what answers where."
-        )
+            raise refusals.other_node(self._link.name, self._terms.node)
+        raise refusals.silence(self._link.name, PATIENCE)
 
     def _introduce(self) -> str:
         identity = self._caller.ask(Hello(self._session, PROTOCOL_HASH), Identity)
         name = self._link.name
         if identity is None:
-            raise OpenError(
-                f"{name}: the device sends samples but does not answer. Check the wire from host to "
-                f"device (TX)."
-            )
+            raise refusals.deaf(name)
         firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
         if identity.mismatch or identity.protocol_hash != PROTOCOL_HASH:
-            raise OpenError(
-                f"{name}: firmware {firmware} speaks protocol {identity.protocol_hash:08x}, this host "
-                f"{PROTOCOL_HASH:08x}. Flash the firmware that comes with this version of dcmp-hil, or "
-                f"install "
-                "the dcmp-hil that the firmware came with."
-            )
+            raise refusals.other_protocol(name, firmware, identity.protocol_hash)
         if identity.busy or not identity.owned:
-            raise OpenError(
-                f"{name}: another host owns the device. End its run first; what it leaves behind is given "
-                "up by the device after half a second."
-            )
+            raise refusals.owned(name)
         return firmware
 
     def _compare(self) -> None:
+        """Hold the rig against the device; every difference at once."""
         terms = self._terms
         counts = self._get(Parameter.COUNTS_PER_REV)
-        period_us = self._get(Parameter.PERIOD_US)
-        limit_mV = self._get(Parameter.VOLTAGE_LIMIT_MV)
+        rate_hz, allowed_V = (
+            1e6 / self._get(Parameter.PERIOD_US),
+            1e-3 * self._get(Parameter.VOLTAGE_LIMIT_MV),
+        )
+        asked_hz, asked_V = 1e6 / terms.period_us, 1e-3 * terms.voltage_limit_mV
         faults = []
         if counts != terms.counts_per_rev:
             faults.append(
                 f"encoder.counts_per_rev: the rig says {terms.counts_per_rev}, the device {counts}. "
-                f"Correct the "
-                "rig, or build the firmware for this encoder."
+                "Correct the rig, or build the firmware for this encoder."
             )
-        if period_us != terms.period_us:
+        if rate_hz != asked_hz:
             faults.append(
-                f"loop.rate_hz: the rig says {1e6 / terms.period_us:g}, the device {1e6 / period_us:g}. "
-                f"Correct "
-                "the rig, or build the firmware for this rate."
+                f"loop.rate_hz: the rig says {asked_hz:g}, the device {rate_hz:g}. "
+                "Correct the rig, or build the firmware for this rate."
             )
-        if limit_mV < terms.voltage_limit_mV:
+        if allowed_V < asked_V:
             faults.append(
-                f"amplifier.voltage_limit_V: the rig says {1e-3 * terms.voltage_limit_mV:g}, the device "
-                f"allows "
-                f"{1e-3 * limit_mV:g}. Lower it in the rig."
+                f"amplifier.voltage_limit_V: the rig says {asked_V:g}, the device allows {allowed_V:g}. "
+                "Lower it in the rig."
             )
         if faults:
             raise ConfigError(*faults)
@@ -152,12 +145,7 @@ class Handshake:
         """Refuse a USB adapter that collects bytes for 16 ms: every command would be too old."""
         best = min(self._round_trip() for _ in range(_ROUND_TRIPS))
         if best > _SLOWEST + 1e-6 * self._terms.period_us:
-            raise OpenError(
-                f"{self._link.name}: an answer takes {1e3 * best:.1f} ms, and commands older than 3 ms "
-                f"are refused. "
-                "Lower the USB adapter's latency timer: "
-                "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
-            )
+            raise refusals.slow(self._link.name, best)
 
     def _round_trip(self) -> float:
         began_ns = self._clock.now_ns()
@@ -172,11 +160,7 @@ class Handshake:
             return
         self._answer(clear=False)
         if not self._answer_until(State.IDLE, clear=True):
-            raise OpenError(
-                f"{self._link.name}: the device stays in fault {sample.fault_class}. Look at what "
-                f"`dcmp-hil monitor` "
-                "says, mend the cause, and switch the device off and on."
-            )
+            raise refusals.faulty(self._link.name, Fault(sample.fault_class).name)
 
     def _set_limits(self) -> None:
         terms = self._terms
@@ -187,26 +171,16 @@ class Handshake:
         ):
             if value is None:
                 continue
-            question = ParameterSet(self._session, parameter, value)
-            found = self._ask(question)
+            found = self._ask(ParameterSet(self._session, parameter, value))
             if found is None or found.result != Result.OK or found.value != value:
-                raise OpenError(
-                    f"{self._link.name}: the device does not take {parameter.name} = {value}"
-                    f"{'' if found is None else f' and stays at {found.value}'}. Use what it allows, or "
-                    f"build the "
-                    "firmware with a higher limit."
-                )
+                stays = None if found is None else found.value
+                raise refusals.not_taken(self._link.name, parameter.name, value, stays)
 
     def _arm(self) -> None:
         self._join_ticks()
         if not self._answer_until(State.RUN, arm=True):
             state = "no state" if self._caller.sample is None else State(self._caller.sample.state).name
-            raise OpenError(
-                f"{self._link.name}: the device did not arm within {1e3 * PATIENCE:.0f} ms and is in "
-                f"{state}. Commands "
-                "may arrive too late (a slow adapter, a busy computer); `dcmp-hil monitor` shows what it "
-                "counts."
-            )
+            raise refusals.not_armed(self._link.name, state, PATIENCE)
 
     def _answer_until(self, state: State, *, arm: bool = False, clear: bool = False) -> bool:
         """Answer SAMPLEs at 0 V until one says `state`; False if none did in time."""
@@ -222,9 +196,12 @@ class Handshake:
         if sample is None:
             return None
         self._tick = nearest(self._tick, sample.tick, 8)
-        drive = Drive(0, self._tick & 0x1FFF, arm, clear, False, self._session, self._terms.watchdog_ms)
-        self._caller.say(drive)
+        self._say(arm=arm, clear=clear)
         return sample.state
+
+    def _say(self, *, arm: bool = False, clear: bool = False, release: bool = False) -> None:
+        seq = self._tick & 0x1FFF
+        self._caller.say(Drive(0, seq, arm, clear, release, self._session, self._terms.watchdog_ms))
 
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte."""
@@ -236,9 +213,5 @@ class Handshake:
     def _get(self, parameter: Parameter) -> int:
         found = self._ask(ParameterGet(parameter))
         if found is None or found.result != Result.OK:
-            raise OpenError(
-                f"{self._link.name}: the device does not say its {parameter.name}. Flash the firmware "
-                f"that comes "
-                "with this version of dcmp-hil."
-            )
+            raise refusals.not_told(self._link.name, parameter.name)
         return found.value

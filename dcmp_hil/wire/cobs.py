@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from binascii import crc_hqx
 from struct import Struct
-
-from fastcrc import crc16
 
 from dcmp_hil.wire.frame import Frame
 
-_crc = crc16.ibm_3740
 _new = tuple.__new__  # a third of the time of a NamedTuple's own
 _LEAST, _MOST = 6, 13  # bytes of an encoded frame, without its delimiter
-_IDS = [number.to_bytes(2, "little") for number in range(0x800)]
-_ID_CRC = [_crc(number) for number in _IDS]
-"""crc16 of every identifier: where that of its payload goes on."""
-_NUMBERS = range(0x800)
+_HIGHEST = 0x7FF
+_IDS = [number.to_bytes(2, "little") for number in range(_HIGHEST + 1)]
+_ID_CRC = [crc_hqx(number, 0xFFFF) for number in _IDS]
+"""CRC-16/IBM-3740 of every identifier: where that of its payload goes on."""
+_two_bytes = Struct("<H").pack
 _DISTANCE = [bytes((length + 1,)) for length in range(_MOST)]
-_LAYOUT = [Struct(f"<xH{max(0, length - 5)}sH") for length in range(_MOST + 1)]
+_take_apart = [Struct(f"<xH{max(0, length - 5)}sH").unpack for length in range(_MOST + 1)]
 
 
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame, its delimiter included."""
     number, data = frame
-    body = b"%b%b%b" % (_IDS[number], data, _crc(data, _ID_CRC[number]).to_bytes(2, "little"))
-    return b"".join([_DISTANCE[len(part)] + part for part in body.split(b"\0")]) + b"\0"
+    body = _IDS[number] + data + _two_bytes(crc_hqx(data, _ID_CRC[number]))
+    stuffed = b""
+    for part in body.split(b"\0"):  # every zero becomes the distance to the next
+        stuffed += _DISTANCE[len(part)] + part
+    return stuffed + b"\0"
 
 
 class Receiver:
@@ -72,7 +74,7 @@ def _decode(chunk: bytes) -> Frame | None:
         place += distance
     if place != length:
         return None
-    number, data, check = _LAYOUT[length].unpack(body)
-    if number not in _NUMBERS or _crc(data, _ID_CRC[number]) != check:
+    number, data, check = _take_apart[length](body)
+    if number > _HIGHEST or crc_hqx(data, _ID_CRC[number]) != check:
         return None
     return _new(Frame, (number, data))

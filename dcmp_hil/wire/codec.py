@@ -25,6 +25,8 @@ _crc = crc8.autosar
 _new = tuple.__new__  # a third of the time of a NamedTuple's own
 _COUNTS = 0xFFFFFF  # 24 bits
 _ARM, _CLEAR, _RELEASE = 1, 2, 4
+_STATUS = [(byte & 7, byte & 8 != 0, byte & 16 != 0, byte >> 5) for byte in range(256)]
+"""State, missed, limited and fault class in SAMPLE's byte of status."""
 _DRIVE, _SAMPLE = Struct("<hHHB"), Struct("<HBhBB")
 _EDGE, _IDENTITY = Struct("<HBHBb"), Struct("<IHB")
 
@@ -58,8 +60,7 @@ def _pack_sample(sample: SampleReport) -> bytes:
 
 def _unpack_sample(data: bytes) -> SampleReport:
     low, high, voltage_mV, tick, status = _SAMPLE.unpack_from(data)
-    fields = low | high << 16, voltage_mV, tick, status & 7, status & 8 != 0, status & 16 != 0, status >> 5
-    return _new(SampleReport, fields)
+    return _new(SampleReport, (low | high << 16, voltage_mV, tick, *_STATUS[status]))
 
 
 def _pack_edge(edge: Edge) -> bytes:

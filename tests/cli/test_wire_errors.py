@@ -122,7 +122,8 @@ def test_wrong_baud_shows_as_damaged_frames(cli: Cli) -> None:
 
 
 def test_wrong_firmware(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dcmp_hil.backends.handshake.PROTOCOL_HASH", 0x0BADCAFE)
+    for room in ("handshake", "refusals"):
+        monkeypatch.setattr(f"dcmp_hil.backends.{room}.PROTOCOL_HASH", 0x0BADCAFE)
     with device() as pump:
         outcome = start(cli, path_of(pump))
         assert not pump.board.enable

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError, TripError
+from dcmp_hil.errors import ConfigError, LinkError, OpenError, SampleTimeoutError, TripError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import protocol_hash
 from dcmp_hil.wire.codec import pack
@@ -287,8 +288,22 @@ def test_second_host_on_a_port_is_told_who_has_it(kind: str) -> None:
 
 
 @wired
+def test_host_that_does_not_fit_gives_the_device_back_at_once(kind: str) -> None:
+    with on_bench(kind) as bench:
+        host = bench.device()
+        fitting = host._terms  # noqa: SLF001
+        host._terms = replace(fitting, counts_per_rev=2000)  # noqa: SLF001
+        with pytest.raises(ConfigError, match="the rig says 2000, the device 4096"):
+            host.__enter__()
+        host._terms = fitting  # noqa: SLF001
+        with host:
+            assert drive(host, 1.0, 3)[-1].voltage == 1.0
+
+
+@wired
 def test_other_protocol_is_refused_with_both_versions(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dcmp_hil.backends.handshake.PROTOCOL_HASH", 0x12345678)
+    monkeypatch.setattr("dcmp_hil.backends.refusals.PROTOCOL_HASH", 0x12345678)
     with on_bench(kind) as bench:
         with pytest.raises(OpenError) as caught:
             bench.make().__enter__()

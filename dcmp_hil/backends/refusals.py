@@ -1,0 +1,94 @@
+"""Why a device cannot be used, each with its remedy; `name` is what to call the link."""
+
+from __future__ import annotations
+
+from dcmp_hil.errors import OpenError
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+
+_FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
+
+
+def only_damage(name: str) -> OpenError:
+    """Make the error for a line on which something is heard, and no frame in it."""
+    return OpenError(
+        f"{name}: something arrives, but no valid frame. Check the baud or bit rate (backend.baud, "
+        "backend.bitrate) and that the device is set to the same carrier."
+    )
+
+
+def other_node(name: str, node: int) -> OpenError:
+    """Make the error for frames of other devices alone."""
+    return OpenError(
+        f"{name}: frames arrive, but none from node {node}. Check backend.node; `dcmp-hil ports` lists "
+        "who is there."
+    )
+
+
+def silence(name: str, seconds: float) -> OpenError:
+    """Make the error for a silent line."""
+    return OpenError(
+        f"{name}: nothing arrives within {1e3 * seconds:.0f} ms. Check that the device has power, that "
+        "the cable is the right one, and the rate; `dcmp-hil ports` lists what answers where."
+    )
+
+
+def deaf(name: str) -> OpenError:
+    """Make the error for a device that is heard and does not hear."""
+    return OpenError(
+        f"{name}: the device sends samples but does not answer. Check the wire from host to device (TX)."
+    )
+
+
+def other_protocol(name: str, firmware: str, protocol: int) -> OpenError:
+    """Make the error for two sides that do not speak the same."""
+    return OpenError(
+        f"{name}: firmware {firmware} speaks protocol {protocol:08x}, this host {PROTOCOL_HASH:08x}. "
+        f"{_FIRMWARE}, or install the dcmp-hil that the firmware came with."
+    )
+
+
+def owned(name: str) -> OpenError:
+    """Make the error for a device that somebody else has."""
+    return OpenError(
+        f"{name}: another host owns the device. End its run first; what it leaves behind is given up by "
+        "the device after half a second."
+    )
+
+
+def slow(name: str, seconds: float) -> OpenError:
+    """Make the error for answers that take too long."""
+    return OpenError(
+        f"{name}: an answer takes {1e3 * seconds:.1f} ms, and commands older than 3 ms are refused. Lower "
+        "the USB adapter's latency timer: "
+        "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
+    )
+
+
+def faulty(name: str, fault: str) -> OpenError:
+    """Make the error for a fault that does not clear."""
+    return OpenError(
+        f"{name}: the device stays in fault {fault}. Look at what `dcmp-hil monitor` says, mend the "
+        "cause, and switch the device off and on."
+    )
+
+
+def not_taken(name: str, parameter: str, value: int, stays: int | None) -> OpenError:
+    """Make the error for a parameter that stays as it was."""
+    instead = "" if stays is None else f" and stays at {stays}"
+    return OpenError(
+        f"{name}: the device does not take {parameter} = {value}{instead}. Use what it allows, or build "
+        "the firmware with a higher limit."
+    )
+
+
+def not_told(name: str, parameter: str) -> OpenError:
+    """Make the error for a parameter that is not there."""
+    return OpenError(f"{name}: the device does not say its {parameter}. {_FIRMWARE}.")
+
+
+def not_armed(name: str, state: str, seconds: float) -> OpenError:
+    """Make the error for a device that does not get to RUN."""
+    return OpenError(
+        f"{name}: the device did not arm within {1e3 * seconds:.0f} ms and is in {state}. Commands may "
+        "arrive too late (a slow adapter, a busy computer); `dcmp-hil monitor` shows what it counts."
+    )
