@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dcmp_hil.backends.device import LinkCounters
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.recorder import Sink
 
@@ -43,6 +44,8 @@ class Result:
         What happened, in order.
     dropped
         Periods that telemetry lost because a sink was slow; they are in no figure.
+    link
+        What was lost or damaged on the way and survived; None where there is no wire.
     """
 
     rig: Rig
@@ -50,6 +53,7 @@ class Result:
     columns: dict[str, NDArray[np.float64]]
     events: tuple[Event, ...]
     dropped: int = 0
+    link: LinkCounters | None = None
 
 
 class Session:
@@ -134,6 +138,7 @@ class Session:
             columns=self._keeper.columns() if self._keeper else {},
             events=tuple(self._keeper.events) if self._keeper else (),
             dropped=self._recorder.dropped,
+            link=getattr(self._line.backend, "counters", None),
         )
 
 

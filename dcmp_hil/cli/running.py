@@ -127,6 +127,7 @@ def _conclude(
         "version": __version__,
         "ended_by": ended_by,
         "dropped_periods": result.dropped,
+        "link": None if result.link is None else asdict(result.link),
     }
     if options.json_file != "-":
         console.out.print(summary_table(session.rig, result, ended_by))

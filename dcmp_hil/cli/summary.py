@@ -39,6 +39,9 @@ def _figures(result: Result) -> Table:
         ("speed", f"{figures.realtime_factor:.4g}", "x real time"),
     ):
         table.add_row(what, value, unit)
+    if result.link is not None:
+        lost = f"{result.link.lost} lost, {result.link.stale} late or twice, {result.link.skipped} skipped"
+        table.add_row("samples", lost, f"{result.link.corrupt} damaged frames")
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table

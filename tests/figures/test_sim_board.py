@@ -43,3 +43,10 @@ def test_default_start_engages_through_the_wire() -> None:
     result = run(bench("backend.kind=sim-board"), duration=8.0, fast=True, window_from=4.0)
     assert known(result.summary.tracking_rms_rad) < 0.28e-3
     assert result.summary.late_periods == 0
+
+
+def test_result_counts_what_was_lost_on_the_way() -> None:
+    result = run(bench("backend.kind=sim-board"), duration=1.0, fast=True)
+    assert result.link is not None
+    assert (result.link.lost, result.link.stale, result.link.skipped, result.link.corrupt) == (0, 0, 0, 0)
+    assert run(bench(), duration=1.0, fast=True).link is None
