@@ -40,8 +40,9 @@ def _figures(result: Result) -> Table:
     ):
         table.add_row(what, value, unit)
     if result.link is not None:
-        lost = f"{result.link.lost} lost, {result.link.stale} late or twice, {result.link.skipped} skipped"
-        table.add_row("samples", lost, f"{result.link.corrupt} damaged frames")
+        link = result.link
+        others = f"{link.stale} late or twice, {link.skipped} skipped, {link.corrupt} damaged"
+        table.add_row("samples lost", str(link.lost), others)
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table
