@@ -34,8 +34,9 @@ class Receiver:
         *lines, rest = (self._rest + data).split(b"\r")
         frames = []
         for line in lines:
-            if self._too_long:
-                self._too_long = False  # counted when it became too long
+            if self._too_long or len(line) > _LONGEST:
+                self.corrupt += not self._too_long  # or it was counted when it became too long
+                self._too_long = False
                 continue
             frame = _decode(line)
             if frame is not None:
