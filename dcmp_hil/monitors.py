@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.errors import TripError
+from dcmp_hil.faults import meaning_of
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
@@ -27,10 +28,9 @@ class Finite:
     def check(self, sample: Sample, estimate: Estimate) -> None:
         """Raise TripError on NaN, infinity or a device fault."""
         if sample.fault != Fault.NONE:
+            sentence, remedy = meaning_of(sample.fault)
             raise TripError(
-                "device_fault",
-                f"The device reports fault {sample.fault} at t = {sample.t:.3f} s.",
-                "Look the code up in the list of faults, mend the cause, then arm again.",
+                "device_fault", f"{sentence} (fault {sample.fault}, t = {sample.t:.3f} s).", remedy
             )
         t, position, voltage, _ = sample
         x1, x2, w = estimate

@@ -11,6 +11,7 @@ import can
 import serial
 
 from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.backends.failures import reason
 from dcmp_hil.backends.serial_link import path_of
 from dcmp_hil.backends.slcan_bus import SlcanBus
 from dcmp_hil.config.backends import Can as CanSettings
@@ -160,7 +161,7 @@ class CanLink:
 
     def _broken(self, error: BaseException) -> LinkError:
         return LinkError(
-            f"{self.name}: the connection broke ({error}). The device goes to 0 V by itself. Look at "
+            f"{self.name}: the connection broke ({reason(error)}). The device goes to 0 V by itself. Look at "
             f"adapter, cable "
             "and bus, then start again."
         )

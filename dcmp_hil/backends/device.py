@@ -168,6 +168,7 @@ class DeviceBackend:
             newer = self._newer(frame, newest.tick)
             if newer is not None:
                 self.counters.skipped += 1
+                self.counters.lost -= 1  # a gap that was not the wire's
                 newest = newer
         return newest
 

@@ -44,6 +44,12 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
     return OpenError(f"{path}: cannot be opened: {error}. `dcmp-hil ports` lists what is there.")
 
 
+def reason(error: BaseException) -> str:
+    """Say what a library's words about a broken port come to."""
+    words = str(error)
+    return "the other end has hung up" if "returned no data" in words else words
+
+
 def _number_of(error: BaseException | None) -> int | None:
     """Return the errno of an error, or of the one that it was raised in place of."""
     while error is not None:

@@ -13,7 +13,7 @@ import serial
 from serial.tools import list_ports
 
 from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.backends.failures import cannot_open
+from dcmp_hil.backends.failures import cannot_open, reason
 from dcmp_hil.config.backends import Serial as SerialSettings
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
 from dcmp_hil.wire import cobs
@@ -130,8 +130,8 @@ class SerialLink:
 
     def _broken(self, error: BaseException) -> LinkError:
         return LinkError(
-            f"{self.name}: the connection broke ({error}). The device goes to 0 V by itself. Plug it in, "
-            "look at the cable, then start again."
+            f"{self.name}: the connection broke ({reason(error)}). The device goes to 0 V by itself. "
+            "Plug it in, look at the cable, then start again."
         )
 
 

@@ -1,0 +1,63 @@
+"""What a device's fault means, and what to look at first."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from dcmp_hil.values import Fault
+
+
+class Meaning(NamedTuple):
+    """A fault in words."""
+
+    sentence: str
+    remedy: str
+
+
+_MEANINGS = {
+    Fault.HOST_SILENT: Meaning(
+        "The device heard no valid command for longer than its watchdog allows",
+        "The computer was too busy, or commands arrive damaged or too late: close other programs, look at "
+        "the lateness in the summary, or raise backend.watchdog_ms (at most 50).",
+    ),
+    Fault.LINK_DOWN: Meaning("The line to the device hung up", "Look at cable, adapter and bus termination."),
+    Fault.STOPPED: Meaning("Somebody sent STOP", "Find out who and why before you start again."),
+    Fault.CORRUPT_LINK: Meaning(
+        "10 of the last 100 frames at the device were damaged",
+        "Look at cable, ground and termination; lower the baud rate.",
+    ),
+    Fault.OVER_SPEED: Meaning(
+        "The arm turned faster than the firmware's own limit",
+        "Look at the signs of motor and encoder, the reference and the gains.",
+    ),
+    Fault.OVER_TRAVEL: Meaning(
+        "The arm went further than the firmware's own limit",
+        "Bring it back by hand; look at the reference and at encoder.zero.",
+    ),
+    Fault.ENCODER_JUMP: Meaning(
+        "The encoder's count jumped", "Look at its cable, shield and supply, and at counts_per_rev."
+    ),
+    Fault.BREAK_INPUT: Meaning(
+        "The amplifier's own protection acted", "Look at motor current, temperature and supply."
+    ),
+    Fault.INTERNAL: Meaning("The firmware found itself in trouble", "Switch it off and on; report it."),
+    Fault.DISARMED: Meaning(
+        "The device left RUN by itself and names no fault, as after a reset",
+        "Look at its supply (brown-out?) and at its reset button.",
+    ),
+}
+
+
+def meaning_of(code: int) -> Meaning:
+    """Return a fault in words, whatever the code.
+
+    Parameters
+    ----------
+    code
+        A Fault, or a number that this version does not know.
+    """
+    unknown = Meaning(
+        f"The device reports fault {code}, which this version does not know",
+        "Look it up in the firmware's own list, mend the cause, then start again.",
+    )
+    return _MEANINGS.get(Fault(code), unknown) if code in set(Fault) else unknown
