@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
-from sim_backend.encoder import Encoder
+from sim_backend.encoder import make_encoder
 from sim_backend.pace import Pace
 from sim_backend.plant import make_plant
 
@@ -40,12 +40,7 @@ class SimBackend:
         self._period = rig.period
         self._tick = 0
         self._plant = make_plant(rig)
-        self._encoder = Encoder(
-            rig.encoder.counts,
-            phase=rig.sim.encoder_phase_counts,
-            noise=rig.sim.encoder_noise_counts,
-            seed=rig.sim.seed,
-        )
+        self._encoder = make_encoder(rig)
         self._amplifier = Amplifier(
             limit=rig.amplifier.limit,
             slew=rig.amplifier.slew * rig.period,

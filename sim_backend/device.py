@@ -5,18 +5,18 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
-import struct
 import subprocess
 import threading
 from collections import deque
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 from dcmp_hil.errors import BackendError, ConfigError, LinkError, OpenError
 from sim_backend import firmware
 from sim_backend.board_config import NATIVE, board_config
 from sim_backend.pace import Pace
 from sim_backend.pins import Pins
+from sim_backend.plant_port import OUTPUT, PLANT_TIME, TICK, Output
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -25,38 +25,12 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Truth
 
-_TICK = struct.Struct("<IIHBx")  # firmware/boards/native/plant_port.h
-_OUTPUT = struct.Struct("<IIhBBHBB")
-_PLANT_TIME, _UNASKED, _LINK_UP = 1, 1, 2
 _LIVE = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE
 _BRISK_MS = 2  # wall: how long a tick in plant time waits for a host that does not drive
 _ANSWER_S = 10.0  # wall: the process is gone if it takes longer
 _END_S = 2.0
 _KEPT = 10_000
 _WORD = 0xFFFF_FFFF
-
-
-class Output(NamedTuple):
-    """What the firmware told the plant."""
-
-    now_us: int  # by the firmware's clock
-    since_us: int  # when the output became what it is
-    voltage_mV: int
-    enable: int
-    state: int
-    owner: int
-    fault: int
-    flags: int
-
-    @property
-    def unasked(self) -> bool:
-        """Whether it changed between two ticks."""
-        return self.flags & _UNASKED != 0
-
-    @property
-    def link_up(self) -> bool:
-        """Whether a host has the port open."""
-        return self.flags & _LINK_UP != 0
 
 
 class VirtualDevice:
@@ -219,9 +193,9 @@ class VirtualDevice:
             self.now_us = (self.now_us + self._config["period_us"]) & _WORD
         self.tick_count += 1
         wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _LIVE else _BRISK_MS
-        flags = 0 if self._pace else _PLANT_TIME
+        flags = 0 if self._pace else PLANT_TIME
         try:
-            self._plug().sendall(_TICK.pack(self.now_us, self.pins.count(), wait_ms, flags))
+            self._plug().sendall(TICK.pack(self.now_us, self.pins.count(), wait_ms, flags))
         except OSError as error:
             raise self._lost(error) from error
         while not self._listen():
@@ -236,9 +210,9 @@ class VirtualDevice:
         if not data:
             raise self._lost(None)
         data = self._rest + data
-        whole = len(data) - len(data) % _OUTPUT.size
+        whole = len(data) - len(data) % OUTPUT.size
         self._rest = data[whole:]
-        outputs = [Output(*fields) for fields in _OUTPUT.iter_unpack(data[:whole])]
+        outputs = [Output(*fields) for fields in OUTPUT.iter_unpack(data[:whole])]
         self.log.extend(outputs)
         if outputs:
             self.output = outputs[-1]

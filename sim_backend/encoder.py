@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 import random
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
 
 
 class Encoder:
@@ -47,3 +51,13 @@ class Encoder:
         if self._noise:
             counts += self._random.gauss(0.0, self._noise)
         return math.floor(counts + 0.5)
+
+
+def make_encoder(rig: Rig) -> Encoder:
+    """Make the encoder that a rig's `[encoder]` and `[sim]` describe."""
+    return Encoder(
+        rig.encoder.counts,
+        phase=rig.sim.encoder_phase_counts,
+        noise=rig.sim.encoder_noise_counts,
+        seed=rig.sim.seed,
+    )

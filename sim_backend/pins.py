@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.values import Truth
 from sim_backend.amplifier import Amplifier
-from sim_backend.encoder import Encoder
+from sim_backend.encoder import make_encoder
 from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
@@ -29,12 +29,7 @@ class Pins:
 
     def __init__(self, rig: Rig, count_offset: int = 0) -> None:
         self._plant = make_plant(rig)
-        self._encoder = Encoder(
-            rig.encoder.counts,
-            phase=rig.sim.encoder_phase_counts,
-            noise=rig.sim.encoder_noise_counts,
-            seed=rig.sim.seed,
-        )
+        self._encoder = make_encoder(rig)
         self._stage = _power_stage(rig)
         self._mV_per_V = rig.amplifier.sign * 1e3
         self._encoder_sign = rig.encoder.sign

@@ -34,7 +34,7 @@ FAILURES = (
 """What interfaces of python-can raise when they fail; TypeError and AttributeError come from closed "
 "ports."""
 
-_NETWORKED = ("udp_multicast", "socketcand", "cantact_net", "neousys_net")
+_NETWORKED = ("socketcand", "udp_multicast")
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
 _LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
 
