@@ -30,7 +30,7 @@ def test_explain_leaves_simulation_out_when_backend_is_another() -> None:
 
 
 def test_shipped_rigs_have_no_warnings() -> None:
-    assert [warnings(load_rig(name)) for name in shipped_rigs()] == [[], []]
+    assert [warnings(load_rig(name)) for name in shipped_rigs()] == [[]] * 4
 
 
 @pytest.mark.parametrize(
