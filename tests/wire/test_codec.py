@@ -1,6 +1,7 @@
 """Messages to frames and back; cantools is the judge."""
 
 import random
+from binascii import crc_hqx
 from enum import IntEnum
 from typing import Any
 
@@ -29,6 +30,7 @@ def _seal(number: int, body: bytes) -> Frame:
 def test_check_values_of_the_checksums() -> None:
     assert (crc8(b"123456789"), fastcrc.crc8.autosar(b"123456789")) == (0xDF, 0xDF)
     assert (crc16(b"123456789"), fastcrc.crc16.ibm_3740(b"123456789")) == (0x29B1, 0x29B1)
+    assert crc_hqx(b"123456789", 0xFFFF) == 0x29B1
 
 
 def test_every_message_has_its_class() -> None:

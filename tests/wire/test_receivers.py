@@ -269,6 +269,12 @@ def test_bells_are_counted_the_same_in_any_pieces(bells: int) -> None:
         b"f00",
         b"x",
         b"zt0401AA",
+        b"\x07zt0401AA",
+        b"t0401\x07AA",
+        b"v0101",
+        b"F0a",
+        b"V01011",
+        b"NDCMP1",
     ],
 )
 def test_lines_that_are_corrupt(line: bytes) -> None:
