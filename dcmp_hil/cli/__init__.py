@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from typing import Annotated
 
 import typer
@@ -19,6 +20,7 @@ from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.telemetry.outlet import THREAD
 
 app = typer.Typer(
     help="Run a DC-motor pendulum: observer, controller, amplifier, live picture.",
@@ -48,6 +50,22 @@ def _options(
 
 def main() -> None:
     """Run the command line; every error of this package becomes its message and its exit code."""
+    try:
+        _call()
+    except SystemExit as leaving:
+        if any(thread.name == THREAD for thread in threading.enumerate()):
+            _leave_at_once(leaving.code if isinstance(leaving.code, int) else bool(leaving.code))
+        raise
+
+
+def _leave_at_once(code: int) -> None:
+    """Leave without Rerun's own ending, which waits for a frozen viewer for ever."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _call() -> None:
     try:
         app()
     except DcmpError as error:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     Job = Callable[[rr.RecordingStream], None]
 
+THREAD = "rerun"
+"""Name of the threads: one that is still there after `close` is stuck for good."""
 _WAITING = 32  # jobs; 3 s of a run in real time
 _FLUSH = 5.0  # s
 
@@ -49,7 +51,7 @@ class Outlet:
         self._ending = ending
         self._jobs: Queue[Job | None] = Queue(_WAITING)
         self._error: Exception | None = None
-        self._thread = threading.Thread(target=self._serve, name="rerun", daemon=True)
+        self._thread = threading.Thread(target=self._serve, name=THREAD, daemon=True)
         self._thread.start()
 
     def do(self, job: Job) -> bool:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _PROBE = 0.4  # s
 _SERVER_START = 3.0  # s
 _CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
-_FAREWELL = 4.0  # s, for a viewer that was there before: if it is frozen, the last call never returns
+_FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
 

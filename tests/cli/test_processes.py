@@ -86,3 +86,27 @@ def test_help_imports_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+_STUCK = """
+import sys, threading
+from dcmp_hil.cli import main
+from dcmp_hil.telemetry.outlet import THREAD
+threading.Thread(target=threading.Event().wait, name=THREAD).start()  # never ends, and Python would wait for it
+sys.argv = ["dcmp-hil", *sys.argv[1:]]
+main()
+"""
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["rigs"], 0), (["check", "no-such-rig"], 2)])
+def test_a_way_to_a_viewer_that_is_stuck_does_not_hold_the_exit_up(arguments: list[str], code: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _STUCK, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=_BOUND,
+        check=False,
+    )
+    assert done.returncode == code
+    assert ("bench-1khz" in done.stdout) == (code == 0)
+    assert ("no-such-rig" in done.stderr) == (code == 2)
