@@ -92,7 +92,7 @@ _STUCK = """
 import sys, threading
 from dcmp_hil.cli import main
 from dcmp_hil.telemetry.outlet import THREAD
-threading.Thread(target=threading.Event().wait, name=THREAD).start()  # never ends, and Python would wait for it
+threading.Thread(target=threading.Event().wait, name=THREAD).start()  # never ends, and Python waits
 sys.argv = ["dcmp-hil", *sys.argv[1:]]
 main()
 """
