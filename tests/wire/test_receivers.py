@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import tracemalloc
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
@@ -179,6 +180,17 @@ def test_too_long_counts_once(carrier: Carrier, size: int, letter: bytes) -> Non
             assert receiver.corrupt == round_
         assert receiver.feed(carrier.end + carrier.module.encode(FIRST)) == [FIRST]
         assert receiver.corrupt == round_
+
+
+@CARRIERS
+def test_what_is_too_long_is_not_kept(carrier: Carrier) -> None:
+    receiver, piece = carrier.module.Receiver(), 1000 * b"t"
+    tracemalloc.start()
+    for _ in range(300):
+        receiver.feed(piece)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 30_000
 
 
 @CARRIERS
