@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import controllers, observers
@@ -15,6 +16,7 @@ from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.plugins import find_named
 from dcmp_hil.predictor import Predictor
+from dcmp_hil.probe import Probe
 from dcmp_hil.supervisor import Supervisor
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 _SETTLE, _ENGAGE = 0.25, 0.25  # s: ten time constants of the observer, then a ramp of authority
+_PROBE_V, _OVER_FRICTION = 1.0, 2.0  # V; friction that a push must overcome by so much
 _WATCH_FLOOR = 100.0  # rad/s, mu0 of the watching observer
 
 
@@ -98,16 +101,26 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
         watch = SuperTwisting(setting, mu0=min(_WATCH_FLOOR, 0.3 / rig.period))
         monitors += [
             Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
-            DisturbanceWatch(watch, rig.period, limits.disturbance_limit_rad_s2),
+            DisturbanceWatch(watch, rig.period, limits.disturbance_limit_rad_s2, rig.model.ku_rad_s2_V),
         ]
     immediate = limits.start == "immediate"
+    probe = None if immediate or limits.probe == "off" else make_probe(rig)
     return Supervisor(
         monitors,
         voltage_limit=rig.amplifier.limit,
         settle=0.0 if immediate else _SETTLE,
         engage=0.0 if immediate else _ENGAGE,
         notify=notify,
+        probe=probe,
     )
+
+
+def make_probe(rig: Rig) -> Probe | None:
+    """Make the probe of a rig; None where its encoder is too coarse to tell."""
+    model, counts = rig.model.values(), rig.encoder.counts
+    voltage = min(rig.amplifier.limit, max(_PROBE_V, _OVER_FRICTION * model.f1 / model.ku))
+    probe = Probe(model.ku, voltage, 0.0 if counts is None else math.tau / counts)
+    return probe if probe.telling else None
 
 
 def _make_custom(section: Custom, setting: object, key: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Protocol
 
+from dcmp_hil.diagnosis import Diagnosis
 from dcmp_hil.errors import TripError
 from dcmp_hil.faults import meaning_of
 from dcmp_hil.values import Fault
@@ -91,12 +92,17 @@ class DisturbanceWatch:
         s.
     limit
         rad/s2.
+    ku
+        (rad/s2)/V, the believed motor gain ku/J.
     for_
         s, how long the filtered |w_hat| must stay above the limit.
     """
 
-    def __init__(self, observer: Observer, period: float, limit: float, for_: float = 5e-3) -> None:
+    def __init__(
+        self, observer: Observer, period: float, limit: float, ku: float, for_: float = 5e-3
+    ) -> None:
         self._observer = observer
+        self._diagnosis = Diagnosis(ku, period)
         self._keep = math.exp(-period / 10e-3)
         self._limit = limit
         self._allowed = max(1, round(for_ / period))
@@ -104,7 +110,8 @@ class DisturbanceWatch:
         self._above = 0
 
     def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - it has an estimate of its own
-        """Raise TripError once the filtered disturbance has been above the limit for too long."""
+        """Raise TripError, with the likely cause, once the disturbance was too large for too long."""
+        self._diagnosis.add(sample)
         w = self._observer.update(sample).disturbance
         self._filtered = filtered = w + self._keep * (self._filtered - w)
         if -self._limit <= filtered <= self._limit:
@@ -112,10 +119,10 @@ class DisturbanceWatch:
             return
         self._above += 1
         if self._above >= self._allowed or filtered != filtered:
+            reason, sentence, remedy = self._diagnosis.finding()
             raise TripError(
-                "disturbance",
-                f"Estimated disturbance {filtered:.0f} rad/s2 (10 ms mean) at t = {sample.t:.3f} s; "
+                reason,
+                f"{sentence}: {filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
                 f"the limit is {self._limit:g} rad/s2.",
-                "The arm does not answer the voltage as [model] says: check polarity, motor power, the "
-                "encoder's cable, and that the voltage fed back is the one really applied.",
+                remedy,
             )

@@ -153,6 +153,18 @@ class ReversedFromTheStart(Reversed):
     earliest = latest = 0.0
 
 
+class DeadFromTheStart(LostPower):
+    """The motor has no power at all."""
+
+    earliest = latest = 0.0
+
+
+class BlindFromTheStart(StuckEncoder):
+    """The encoder never moves."""
+
+    earliest = latest = 0.0
+
+
 class DelayedPlant(SimBackend):
     """The voltage reaches the motor some periods later than anybody knows."""
 

@@ -35,6 +35,9 @@ class _Finds:
         return Estimate(sample.position, 0.0, self.w)
 
 
+KU = 5.4  # (rad/s2)/V
+
+
 def test_finite_lets_a_healthy_period_pass() -> None:
     assert _reason(Finite()) == ""
 
@@ -82,19 +85,19 @@ def test_ranges_object_when_what_they_watch_is_not_finite(bad: float) -> None:
 def test_disturbance_watch_objects_after_five_milliseconds_above_the_limit(sign: float) -> None:
     # First order over 10 ms from 0 towards 100 rad/s2: 100 (1 - exp(-k/10)) passes 50 after ln 2 x 10
     # = 6.93 periods of 1 ms, so period 7 is the first above, and 7, 8, 9, 10, 11 are five in a row.
-    watch = DisturbanceWatch(_Finds(sign * 100.0), T, 50.0)
+    watch = DisturbanceWatch(_Finds(sign * 100.0), T, 50.0, KU)
     reasons = [_reason(watch) for _ in range(11)]
     assert reasons == [""] * 10 + ["disturbance"]
 
 
 def test_disturbance_watch_passes_when_the_limit_is_reached_and_not_exceeded() -> None:
-    watch = DisturbanceWatch(_Finds(50.0), T, 50.0)
+    watch = DisturbanceWatch(_Finds(50.0), T, 50.0, KU)
     assert {_reason(watch) for _ in range(5000)} == {""}  # it approaches 50 rad/s2 from below
 
 
 def test_disturbance_watch_forgives_a_short_peak() -> None:
     observer = _Finds(100.0)
-    watch = DisturbanceWatch(observer, T, 50.0)
+    watch = DisturbanceWatch(observer, T, 50.0, KU)
     for _ in range(10):  # four periods above the limit, as computed above
         assert _reason(watch) == ""
     observer.w = -1000.0  # pulls the mean below the limit in one period
@@ -102,16 +105,16 @@ def test_disturbance_watch_forgives_a_short_peak() -> None:
     # It is at -1000 + 1063.2 exp(-0.1) = -38 now, and 100 - 138 exp(-k/10) passes 50 with k = 11: the four
     # periods of before must not count, so k = 15 is the fifth.
     observer.w = 100.0
-    assert [_reason(watch) for _ in range(15)] == [""] * 14 + ["disturbance"]
+    assert [_reason(watch) for _ in range(15)] == [""] * 14 + ["stuck"]  # more than 12 samples, all alike
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
 def test_disturbance_watch_objects_at_once_when_its_estimate_is_nan(bad: float) -> None:
-    watch = DisturbanceWatch(_Finds(0.0), T, 50.0)
+    watch = DisturbanceWatch(_Finds(0.0), T, 50.0, KU)
     assert _reason(watch) == ""
-    watch = DisturbanceWatch(_Finds(math.nan), T, 50.0)
+    watch = DisturbanceWatch(_Finds(math.nan), T, 50.0, KU)
     assert _reason(watch) == "disturbance"
-    watch = DisturbanceWatch(_Finds(bad), T, 50.0)
+    watch = DisturbanceWatch(_Finds(bad), T, 50.0, KU)
     assert "disturbance" in [_reason(watch) for _ in range(5)]
 
 

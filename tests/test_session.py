@@ -149,7 +149,8 @@ def test_run_on_the_walls_clock_delivers_every_period() -> None:
 
 def test_run_settles_then_engages_then_runs() -> None:
     # 0.25 s each (safety.md, "Start of a run"): 0 V, then a growing limit, then all of it
-    result = run(bench("sim.position_rad=0.02", "sim.plant.eta_rad_s2=0.5"), duration=4.0, fast=True)
+    rig = bench("supervisor.probe=off", "sim.position_rad=0.02", "sim.plant.eta_rad_s2=0.5")
+    result = run(rig, duration=4.0, fast=True)
     phases = [(event.t, event.text) for event in result.events if event.level == "PHASE"]
     assert [text for _, text in phases] == ["settling", "engaging", "running"]
     assert [t for t, _ in phases] == pytest.approx([0.0, 0.25, 0.5], abs=1e-9)
@@ -160,8 +161,22 @@ def test_run_settles_then_engages_then_runs() -> None:
     assert np.abs(sent[t > 0.5]).max() > 0.1
 
 
+def test_run_probes_before_it_settles() -> None:
+    # 0.1 s at 0 V, +1 V and -1 V for at most 0.1 s each (safety.md, "Start of a run")
+    result = run(bench(), duration=2.0, fast=True)
+    phases = [(event.t, event.text) for event in result.events if event.level == "PHASE"]
+    assert [text for _, text in phases] == ["probing", "settling", "engaging", "running"]
+    assert [t for t, _ in phases] == pytest.approx([0.0, 0.3, 0.55, 0.8], abs=3e-3)
+    t, sent = result.columns["time_s"], result.columns["voltage_sent_V"]
+    assert set(sent[t < 0.0995]) == {0.0}
+    assert set(sent[(t > 0.1005) & (t < 0.1995)]) == {1.0}
+    assert set(sent[(t > 0.2025) & (t < 0.2995)]) == {-1.0}
+    assert set(sent[(t > 0.3025) & (t < 0.5495)]) == {0.0}
+    assert np.abs(result.columns["position_true_rad"][t < 0.6]).max() < 0.1
+
+
 def test_run_starts_the_trajectorys_clock_with_engaging() -> None:
-    result = run(bench("sim.position_rad=0.02"), duration=6.0, fast=True)
+    result = run(bench("supervisor.probe=off", "sim.position_rad=0.02"), duration=6.0, fast=True)
     t, reference = result.columns["time_s"], result.columns["position_reference_rad"]
     late = t > 2.251  # after the soft start of 2 s
     np.testing.assert_allclose(reference[late], np.sin(0.5 * (t[late] - 0.25)), rtol=0, atol=1e-12)
@@ -194,7 +209,8 @@ def test_run_lowers_the_arm_after_its_duration() -> None:
 def test_run_lowers_without_a_kick_when_the_arm_moves_fastest(rate: float) -> None:
     # at the zero of the sine the arm has its full velocity, amplitude x rate
     duration = 0.25 + 2.0 * math.pi / rate * math.ceil(1.0 + rate)
-    result = run(bench("run.end=lower", f"reference.rate_rad_s={rate}"), duration=duration, fast=True)
+    rig = bench("supervisor.probe=off", "run.end=lower", f"reference.rate_rad_s={rate}")
+    result = run(rig, duration=duration, fast=True)
     t, volts = result.columns["time_s"], result.columns["voltage_sent_V"]
     down = t > duration
     assert np.abs(result.columns["velocity_reference_rad_s"][~down][-1]) == pytest.approx(rate, rel=0.01)

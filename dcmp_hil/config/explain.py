@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.backends import Sim, SimBoard
+from dcmp_hil.config.backends import Can, Serial, Sim, SimBoard
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
 from dcmp_hil.config.words import toml_value
@@ -71,7 +71,7 @@ def _by_rule(name: str, rig: Rig) -> str:
 
 def warnings(rig: Rig) -> list[str]:
     """Name what is allowed and yet seldom meant."""
-    rules = (_observer, _damping, _monitors, _immediate, _soft_start, _reach)
+    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start, _reach)
     return [sentence for rule in rules if (sentence := rule(rig))]
 
 
@@ -110,6 +110,12 @@ def _immediate(rig: Rig) -> str:
     if rig.supervisor.start == "engage" or _is_ideal(rig):
         return ""
     return 'supervisor.start = "immediate": no settling and no ramp; "engage" is what a real rig has.'
+
+
+def _probe(rig: Rig) -> str:
+    if rig.supervisor.probe == "first" or not isinstance(rig.backend, Serial | Can):
+        return ""
+    return 'supervisor.probe = "off": a motor or encoder wired the wrong way is found by running away.'
 
 
 def _is_ideal(rig: Rig) -> bool:

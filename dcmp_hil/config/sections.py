@@ -118,6 +118,8 @@ class SupervisorSection(Section):
 
     start: Literal["engage", "immediate"] = "engage"
     """`engage`: settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
+    probe: Literal["first", "off"] = "first"
+    """`first`: before engaging, +-1 V for 0.1 s each show which way the arm goes; `off`: trust the signs."""
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only (simulation only)."""
     velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0

@@ -21,7 +21,13 @@ ARM, GHOST = "rig/arm", "rig/reference"
 LIMITS = "control/voltage_V/limit"
 PERIODS = "loop/period_hist"
 LANES = {
-    "phase": {"settling": FAINT, "engaging": ESTIMATE, "running": REFERENCE},
+    "phase": {
+        "probing": FAINT,
+        "settling": FAINT,
+        "engaging": ESTIMATE,
+        "running": REFERENCE,
+        "tripped": ERROR,
+    },
     "voltage": {"within limits": VOLTAGE, "at the limit": ERROR},
     "samples": {"on time": TIMING, "late": ERROR},
 }

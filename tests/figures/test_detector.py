@@ -34,6 +34,7 @@ class _Detection(NamedTuple):
     judged_from: float  # s
     reason: str
     speed: float  # rad/s, the plant's own, from the fault on
+    distance: float  # rad, the plant's own, from hanging, all the run
 
     @property
     def time(self) -> float:
@@ -55,6 +56,7 @@ def _detect(backend: type[FaultySim], *overrides: str) -> list[_Detection]:
             f"backend.kind=tests.helpers:{backend.__name__}",
             f"sim.seed={seed}",
             f"sim.encoder_phase_counts={seed / 20}",
+            "supervisor.probe=off",
             *overrides,
         )
         at = backend.instant(rig)
@@ -66,15 +68,18 @@ def _detect(backend: type[FaultySim], *overrides: str) -> list[_Detection]:
             reason, tripped = trip.reason, trip.cycles[-1].sample.t
         columns = session.result().columns
         speed = np.abs(columns["velocity_true_rad_s"][columns["time_s"] >= at]).max(initial=0.0)
-        found.append(_Detection(at, tripped, _first_motion(at), reason, float(speed)))
+        distance = np.abs(columns["position_true_rad"]).max()
+        found.append(_Detection(at, tripped, _first_motion(at), reason, float(speed), float(distance)))
     return found
 
 
-@pytest.mark.parametrize("backend", [helpers.StuckEncoder, helpers.LostPower])
-def test_blind_or_dead_motor_is_found_in_time(backend: type[FaultySim]) -> None:
+@pytest.mark.parametrize(
+    ("backend", "reason"), [(helpers.StuckEncoder, "stuck"), (helpers.LostPower, "power")]
+)
+def test_blind_or_dead_motor_is_found_in_time(backend: type[FaultySim], reason: str) -> None:
     # E01, P02: 120 ms median, 600 ms at every seed; measured 74 and 132 ms (stuck), 89 and 209 ms (power)
     found = _detect(backend)
-    assert {each.reason for each in found} <= {"disturbance", "speed", "travel"}
+    assert {each.reason for each in found} == {reason}
     times = [each.time for each in found]
     assert median(times) <= 0.120
     assert max(times) <= 0.600
@@ -84,7 +89,7 @@ def test_blind_or_dead_motor_is_found_in_time(backend: type[FaultySim]) -> None:
 def test_reversal_is_found_in_time_while_the_arm_moves() -> None:
     # P01: 300 ms, 3 rad/s; measured 54 ms median, 98 ms at most
     found = _detect(helpers.Reversed)
-    assert {each.reason for each in found} <= {"disturbance", "speed"}
+    assert {each.reason for each in found} == {"polarity"}
     assert max(each.tripped_at - each.fault_at for each in found) <= 0.300
     assert max(each.speed for each in found) <= 3.0
 
@@ -99,7 +104,7 @@ def test_reversal_is_found_in_time_while_the_arm_moves() -> None:
 def test_reversed_motor_is_found_in_time_from_rest(start: str, live_from: float) -> None:
     # safety.md: at most 230 ms (at rest) and 2.4 rad/s; bounds of P01
     found = _detect(helpers.ReversedFromTheStart, start)
-    assert {each.reason for each in found} <= {"disturbance", "speed"}
+    assert {each.reason for each in found} <= {"polarity", "disturbance"}
     assert max(each.tripped_at - live_from for each in found) <= 0.300
     assert max(each.speed for each in found) <= 3.0
 
@@ -157,11 +162,29 @@ def test_healthy_rig_leaves_the_watch_room(overrides: tuple[str, ...], peak: flo
 
 def test_watch_judges_by_an_observer_of_its_own() -> None:
     # Whatever the rig's own observer claims, the watch sees only sample and voltage.
-    watch = DisturbanceWatch(SuperTwisting(setting(), mu0=100.0), T, 50.0)
+    watch = DisturbanceWatch(SuperTwisting(setting(), mu0=100.0), T, 50.0, 5.4)
 
     def hold_still() -> None:
         for k in range(200):  # 10 V and no motion: w = -54 rad/s2
             watch.check(Sample(k * T, 0.0, 10.0), Estimate(0.0, 0.0, 0.0))
 
-    with pytest.raises(TripError, match="disturbance"):
+    with pytest.raises(TripError, match="same position"):
         hold_still()
+
+
+@pytest.mark.parametrize(
+    ("backend", "reason"),
+    [
+        (helpers.ReversedFromTheStart, "polarity"),
+        (helpers.DeadFromTheStart, "power"),
+        (helpers.BlindFromTheStart, "power"),
+    ],
+)
+def test_probe_finds_it_before_the_arm_has_moved_a_tenth_of_a_radian(
+    backend: type[FaultySim], reason: str
+) -> None:
+    # P01: refused by the probe within 0.1 rad; dead and blind look the same to it
+    found = _detect(backend, "supervisor.probe=first")
+    assert {each.reason for each in found} == {reason}
+    assert max(each.tripped_at for each in found) <= 0.35
+    assert max(each.distance for each in found) <= 0.1
