@@ -51,9 +51,9 @@ def _unpack_drive(data: bytes) -> Drive:
 
 def _pack_sample(sample: SampleReport) -> bytes:
     counts, voltage_mV, tick, state, missed, limited, fault_class = sample
-    _check("state", state, 7)
-    _check("fault_class", fault_class, 7)
-    _check("position_counts", counts, _COUNTS)
+    _check(state, 7)
+    _check(fault_class, 7)
+    _check(counts, _COUNTS)
     status = state | missed << 3 | limited << 4 | fault_class << 5
     return _SAMPLE.pack(counts & 0xFFFF, counts >> 16, voltage_mV, tick, status)
 
@@ -65,7 +65,7 @@ def _unpack_sample(data: bytes) -> SampleReport:
 
 def _pack_edge(edge: Edge) -> bytes:
     counts, age_us, tick, direction = edge
-    _check("position_counts", counts, _COUNTS)
+    _check(counts, _COUNTS)
     return _EDGE.pack(counts & 0xFFFF, counts >> 16, age_us, tick, direction)
 
 
@@ -84,9 +84,9 @@ def _unpack_identity(data: bytes) -> Identity:
     return Identity(protocol_hash, version, bool(flags & 1), bool(flags & 2), bool(flags & 4))
 
 
-def _check(name: str, value: int, most: int) -> None:
+def _check(value: int, most: int) -> None:
     if not 0 <= value <= most:
-        raise error(f"{name}: {value} is outside 0..{most}")
+        raise error
 
 
 def _plain(kind: Any, layout: str) -> tuple[Callable[[Any], bytes], Callable[[bytes], Any], int]:
@@ -124,15 +124,34 @@ def pack(message: Message, node: int = 0) -> Frame:
     Raises
     ------
     ValueError
-        If a field does not fit.
+        If a field does not fit: which one, and its value.
     """
     base, to_bytes = _PACK[type(message)]
     number = base | node
     try:
         body = to_bytes(message)
     except error as cause:
-        raise ValueError(f"{type(message).__name__}: {cause}") from cause
+        raise ValueError(f"{type(message).__name__}: {_misfit(message, to_bytes)}") from cause
     return _new(Frame, (number, body + _BYTE[_crc(body, _ID_CRC[number])]))
+
+
+def _misfit(message: Any, to_bytes: Callable[[Any], bytes]) -> str:
+    """Say which field does not fit: it does not among zeros either. `struct` itself does not know."""
+    zeros = message._make([0] * len(message))
+    fields = message._asdict().items()
+    return next(
+        f"{name}: {value} does not fit"
+        for name, value in fields
+        if not _fits(zeros._replace(**{name: value}), to_bytes)
+    )
+
+
+def _fits(message: Any, to_bytes: Callable[[Any], bytes]) -> bool:
+    try:
+        to_bytes(message)
+    except error:
+        return False
+    return True
 
 
 def unpack(frame: Frame, node: int = 0) -> Message | None:

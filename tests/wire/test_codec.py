@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.frame import Frame
-from dcmp_hil.wire.messages import Parameter, Result, SampleReport, State, StopReason
+from dcmp_hil.wire.messages import Drive, Parameter, Result, SampleReport, State, StopReason
 from tests.firmware.bench import database, encode
 from tests.wire.judge import KINDS, NAMES, NODES, crc8, crc16, fields_of, make, signals, span
 
@@ -84,13 +84,18 @@ def test_pack_knows_how_much_a_field_holds(name: str, signal: Signal) -> None:
         message = make(name, {**fields, signal.name: value})
         assert unpack(pack(message)) == message
     for value in (least - 1, most + 1, 10 * most, -(1 << 40)):
-        with pytest.raises(ValueError, match=rf"^{KINDS[name].__name__}: "):
+        with pytest.raises(
+            ValueError, match=rf"^{KINDS[name].__name__}: {signal.name}: {value} does not fit$"
+        ):
             pack(make(name, {**fields, signal.name: value}))
 
 
 def test_pack_names_the_field() -> None:
-    with pytest.raises(ValueError, match=r"^SampleReport: position_counts: -1 is outside 0\.\.16777215$"):
-        pack(SampleReport(-1, 0, 0, 0, False, False, 0))
+    """The first of two; a number that is no integer fits nowhere."""
+    with pytest.raises(ValueError, match=r"^SampleReport: position_counts: -1 does not fit$"):
+        pack(SampleReport(-1, 0, 0, 8, False, False, 0))
+    with pytest.raises(ValueError, match=r"^Drive: voltage_mV: 1\.5 does not fit$"):
+        pack(Drive(1.5, 8191, True, False, False, 65535, 50))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", NAMES)
