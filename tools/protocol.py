@@ -55,7 +55,12 @@ def files() -> dict[Path, str]:
         ("examples", _examples(value)),
     ):
         pattern = re.compile(rf"(<!-- {name}: [^\n]*-->\n).*?(<!-- /{name} -->)", re.DOTALL)
-        page = pattern.sub(lambda found, part=part: f"{found[1]}\n{part}\n{found[2]}", page)  # type: ignore[misc]
+        page, places = pattern.subn(
+            lambda found, part=part: f"{found[1]}\n{part}\n{found[2]}",  # type: ignore[misc]
+            page,
+        )
+        if places != 1:  # or what is there would pass for checked
+            raise ValueError(f"{PAGE.name} has {places} places for {name}, marked by <!-- {name}: ... -->")
     return {
         PAGE: page,
         PYTHON: '"""Written by tools/protocol.py: what host and device compare before anything else."""\n\n'
