@@ -61,3 +61,8 @@ def meaning_of(code: int) -> Meaning:
         "Look it up in the firmware's own list, mend the cause, then start again.",
     )
     return _MEANINGS.get(Fault(code), unknown) if code in set(Fault) else unknown
+
+
+def name_of(code: int) -> str:
+    """Return the name of a fault, or its number where this version has no name for it."""
+    return Fault(code).name if code in set(Fault) else f"code {code}"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
-from dcmp_hil.wire.messages import SampleReport
+from dcmp_hil.wire.counters import nearest
+from dcmp_hil.wire.messages import FaultReport, Parameter, ParameterValue, SampleReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _Answer = TypeVar("_Answer")
 
+MOST_WAITING = 512  # frames that are skipped for a newer one; a peer that floods is no reason to stay
 REPEAT = 0.05  # s, after which a question is asked again
 PATIENCE = 0.5  # s, for an answer in all
 
@@ -32,11 +34,15 @@ class Caller:
         Times the waiting.
     node
         Of the device.
+    tick
+        Of the newest SAMPLE, as far as it is known: periods since the device's boot.
     """
 
-    def __init__(self, link: Link, clock: Clock, node: int) -> None:
+    def __init__(self, link: Link, clock: Clock, node: int, tick: int = 0) -> None:
         self._link, self._clock, self._node = link, clock, node
         self.sample: SampleReport | None = None  # the newest
+        self.tick = tick  # of it; whole once PARAMETER_VALUE(TICK) was heard
+        self.fault = 0  # code of the last fault heard of
         self.foreign = 0  # frames that are not this device's
         self.corrupt = 0  # frames whose crc8 was wrong
 
@@ -70,7 +76,10 @@ class Caller:
     def hear_sample(self, timeout: float) -> SampleReport | None:
         """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
         sample = self._until(timeout, SampleReport, lambda _: True)
-        while (frame := self._link.receive(0.0)) is not None:
+        for _ in range(MOST_WAITING):
+            frame = self._link.receive(0.0)
+            if frame is None:
+                break
             message = self._understand(frame)
             sample = message if isinstance(message, SampleReport) else sample
         return sample
@@ -95,7 +104,11 @@ class Caller:
         if message is None:
             self.foreign += 1
         elif isinstance(message, SampleReport):
-            self.sample = message
+            self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
+        elif isinstance(message, FaultReport):
+            self.fault = message.code
+        elif isinstance(message, ParameterValue) and message.id == Parameter.TICK:
+            self.tick = message.value
         return message
 
     def _until(self, timeout: float, kind: type[_Answer], fits: Callable[[_Answer], bool]) -> _Answer | None:

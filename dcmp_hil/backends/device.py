@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from dcmp_hil.backends.caller import Caller
+from dcmp_hil.backends.caller import MOST_WAITING, Caller
 from dcmp_hil.backends.goodbye import Goodbye
 from dcmp_hil.backends.handshake import Handshake
 from dcmp_hil.backends.terms import Terms
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 _SEQ = 0x1FFF
 _RUN = int(State.RUN)
 _OTHER_FAULT = 7  # fault_class that only says: see FAULT
+_MOST_LOST = 127  # periods that a tick of 8 bits can bridge
+_SURELY_NS = 200_000_000  # after which any watchdog has acted
 _SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: the end
 
 
@@ -69,6 +71,12 @@ class DeviceBackend:
         self._t = 0.0
         self._fault: int = Fault.NONE
         self._ttl_ms = terms.watchdog_ms
+        self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2
+        """Periods for which the device goes on with a command."""
+        self._bridge_ns = int(_MOST_LOST * 1e9 * rig.period)
+        self._heard_ns = 0
+        self._forgotten = False  # the device has given us up, and may be somebody else's
+        self._answered = 0  # tick of the SAMPLE that was answered last
         self.counters = LinkCounters()
         self.health: Health | None = None
         self.firmware = ""
@@ -93,6 +101,8 @@ class DeviceBackend:
         self._session, self.firmware = greeting.session, greeting.firmware
         self._tick = greeting.tick
         self._first_tick = greeting.tick + 1
+        self._answered = greeting.tick
+        self._heard_ns = self._clock.now_ns()
         self._open = True
         return self
 
@@ -131,14 +141,16 @@ class DeviceBackend:
         """
         if not self._open:
             raise LinkError("The device is not open. Use it as a context manager: with backend: ...")
+        self._check_gap()
         report = self._next_report()
-        self._count_periods(report)
-        raw = report.position_counts
-        if not self._has_count:
-            self._start_counting(raw)
-        self._count = count = nearest(self._count, raw, 24)
+        self._heard_ns = self._clock.now_ns()
+        if report.state == _RUN and self._tick - self._answered > self._memory:
+            raise LinkError(
+                f"{self._link.name}: the device runs, and not on this host's commands: it was not heard of "
+                "for too long, and another host has it now. End one of the two."
+            )
         terms = self._terms
-        position = (count - self._zero) * terms.rad_per_count
+        position = (self._count - self._zero) * terms.rad_per_count
         return Sample(self._t, position, report.voltage_mV / terms.mV_per_V, self._fault_in(report))
 
     def write(self, voltage: float) -> None:
@@ -146,11 +158,23 @@ class DeviceBackend:
         asked_mV = round(voltage * self._terms.mV_per_V) if math.isfinite(voltage) else 0
         voltage_mV = max(-32_768, min(32_767, asked_mV))
         drive = Drive(voltage_mV, self._tick & _SEQ, True, False, False, self._session, self._ttl_ms)
+        self._answered = self._tick
         self._link.send(pack(drive, self._node))
 
     def truth(self) -> Truth:
         """Return NaN: nobody knows."""
         return UNKNOWN_TRUTH
+
+    def _check_gap(self) -> None:
+        """Give up where nobody can say any more which period it is; the device has its watchdog."""
+        gap_ns = self._clock.now_ns() - self._heard_ns
+        if gap_ns <= self._bridge_ns:
+            return
+        self._forgotten = gap_ns > _SURELY_NS
+        raise LinkError(
+            f"{self._link.name}: this computer stood still for {1e-9 * gap_ns:.2f} s. The device's watchdog "
+            "has taken the amplifier to 0 V. Start again."
+        )
 
     def _next_report(self) -> SampleReport:
         """Wait for a SAMPLE; where several are waiting, the newest."""
@@ -160,43 +184,52 @@ class DeviceBackend:
         while newest is None:
             frame = receive(1e-9 * left_ns)
             if frame is not None:
-                newest = self._newer(frame, self._tick)
+                newest = self._take(frame)
             left_ns = deadline_ns - self._clock.now_ns()
             if newest is None and left_ns <= 0:
                 self._give_up()
-        while (frame := receive(0.0)) is not None:
-            newer = self._newer(frame, newest.tick)
+        for _ in range(MOST_WAITING):
+            frame = receive(0.0) if newest.state == _RUN else None  # the end of a run is not skipped
+            if frame is None:
+                break
+            newer = self._take(frame)
             if newer is not None:
                 self.counters.skipped += 1
-                self.counters.lost -= 1  # a gap that was not the wire's
                 newest = newer
         return newest
 
-    def _newer(self, frame: Frame, tick: int) -> SampleReport | None:
-        """Return the SAMPLE in a frame if it is later than `tick`; keep what else tells something."""
+    def _take(self, frame: Frame) -> SampleReport | None:
+        """Return the SAMPLE in a frame if it is a new one; keep what else tells something."""
         try:
             message = unpack(frame, self._node)
         except CorruptFrameError:
             self.counters.corrupt += 1
             return None
         if type(message) is SampleReport:
-            if nearest(tick, message.tick, 8) > tick or message.state != _RUN:
-                return message
-            self.counters.stale += 1
-        elif type(message) is FaultReport:
+            return self._taken(message)
+        if type(message) is FaultReport:
             self._fault = message.code
         elif type(message) is Health:
             self.health = message
         return None
 
-    def _count_periods(self, report: SampleReport) -> None:
-        """Advance device time; lost samples show as a larger step."""
-        tick = nearest(self._tick, report.tick, 8)
-        if tick <= self._tick:  # a device that was reset counts anew
-            tick = self._tick + 1
-        self.counters.lost += tick - self._tick - 1
+    def _taken(self, report: SampleReport) -> SampleReport | None:
+        """Advance device time and position; lost samples show as a larger step, late ones as nothing."""
+        last = self._tick
+        tick = nearest(last, report.tick, 8)
+        if tick <= last:
+            if report.state == _RUN:
+                self.counters.stale += 1
+                return None
+            tick = last + 1  # a device that was reset counts anew
+        self.counters.lost += tick - last - 1
         self._tick = tick
         self._t = (tick - self._first_tick) * self._period
+        if self._has_count:
+            self._count = nearest(self._count, report.position_counts, 24)
+        else:
+            self._start_counting(report.position_counts)
+        return report
 
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
@@ -220,13 +253,17 @@ class DeviceBackend:
         )
 
     def _leave(self, error: BaseException | None) -> None:
-        caller = Caller(self._link, self._clock, self._node)
-        goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms, self._tick)
+        """Say goodbye; after a trip, or where there is nobody to wait for, STOP."""
+        caller = Caller(self._link, self._clock, self._node, self._tick)
+        if isinstance(error, BackendError):
+            if not self._forgotten:
+                caller.say(Stop(StopReason.NO_SAMPLE))
+            return
         if isinstance(error, TripError):
             caller.say(Stop(StopReason.SUPERVISOR))
-        if isinstance(error, BackendError):
-            goodbye.say_only()  # nobody to wait for
-        elif not goodbye.run():
+        goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms)
+        if not goodbye.run(answered=self._answered == self._tick):
+            caller.say(Stop(StopReason.NO_SAMPLE))
             raise LinkError(
                 f"{self._link.name}: the device did not confirm 0 V. Its watchdog acts after {self._ttl_ms} "
                 "ms without a command; look at the amplifier before you touch the arm."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Drive, State
 
 if TYPE_CHECKING:
@@ -22,52 +21,44 @@ class Goodbye:
     Parameters
     ----------
     caller
-        On the link.
+        On the link; it knows the tick of the newest SAMPLE.
     clock
         Bounds the waiting.
     session
         To give back.
     ttl_ms
         ms, of the last commands.
-    tick
-        Of the last SAMPLE.
     """
 
-    def __init__(self, caller: Caller, clock: Clock, session: int, ttl_ms: int, tick: int) -> None:
+    def __init__(self, caller: Caller, clock: Clock, session: int, ttl_ms: int) -> None:
         self._caller, self._clock = caller, clock
         self._session, self._ttl_ms = session, ttl_ms
-        self._tick = tick
 
-    def say_only(self) -> None:
-        """Disarm without waiting for the echo."""
-        self._say(release=False)
+    def run(self, *, answered: bool) -> bool:
+        """Say goodbye; True if the device confirmed 0 V, disarmed.
 
-    def run(self) -> bool:
-        """Say goodbye; True if the device confirmed 0 V, disarmed."""
-        self.say_only()  # at once: a sample may be a period away
+        Parameters
+        ----------
+        answered
+            Whether the newest SAMPLE has its answer already; otherwise 0 V is said at once.
+        """
+        said = 0
+        if not answered:
+            self._say(release=False)
+            said = 1
         deadline_ns = self._clock.now_ns() + _PATIENCE_NS
-        answered = 1
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             sample = self._caller.hear_sample(1e-9 * left_ns)
             if sample is None:
                 return False
-            self._tick = nearest(self._tick, sample.tick, 8)
             confirmed = sample.state in _AT_REST and sample.voltage_mV == 0
-            if confirmed and answered >= _LEAST:
+            if confirmed and said >= _LEAST:
                 self._say(release=True)
                 return True
             self._say(release=False)
-            answered += 1
+            said += 1
         return False
 
     def _say(self, *, release: bool) -> None:
-        drive = Drive(
-            0,
-            self._tick & 0x1FFF,
-            arm=False,
-            clear=False,
-            release=release,
-            session=self._session,
-            ttl_ms=self._ttl_ms,
-        )
-        self._caller.say(drive)
+        seq = self._caller.tick & 0x1FFF
+        self._caller.say(Drive(0, seq, False, False, release, self._session, self._ttl_ms))

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
 from dcmp_hil.errors import BackendError, ConfigError, DcmpError
-from dcmp_hil.values import Fault
-from dcmp_hil.wire.counters import nearest
+from dcmp_hil.faults import name_of
 from dcmp_hil.wire.messages import (
     Drive,
     Hello,
@@ -21,6 +20,8 @@ from dcmp_hil.wire.messages import (
     ParameterValue,
     Result,
     State,
+    Stop,
+    StopReason,
 )
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
@@ -60,7 +61,6 @@ class Handshake:
     def __init__(self, link: Link, caller: Caller, terms: Terms, clock: Clock) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._session = 1 + secrets.randbelow(0xFFFF)
-        self._tick = 0
 
     def run(self) -> Greeting:
         """Go through all of it; afterwards the device is in RUN and hears 0 V.
@@ -83,7 +83,11 @@ class Handshake:
         except DcmpError:
             self._give_back()
             raise
-        return Greeting(self._session, self._tick, firmware)
+        except BaseException:  # Ctrl-C: it may be armed by now
+            with contextlib.suppress(BackendError):
+                self._caller.say(Stop(StopReason.PERSON))
+            raise
+        return Greeting(self._session, self._caller.tick, firmware)
 
     def _give_back(self) -> None:
         """Release the session, so that whoever tries next need not wait until it lapses."""
@@ -160,7 +164,7 @@ class Handshake:
             return
         self._answer(clear=False)
         if not self._answer_until(State.IDLE, clear=True):
-            raise refusals.faulty(self._link.name, Fault(sample.fault_class).name)
+            raise refusals.faulty(self._link.name, name_of(self._caller.fault or sample.fault_class))
 
     def _set_limits(self) -> None:
         terms = self._terms
@@ -173,13 +177,13 @@ class Handshake:
                 continue
             found = self._ask(ParameterSet(self._session, parameter, value))
             if found is None or found.result != Result.OK or found.value != value:
-                stays = None if found is None else found.value
-                raise refusals.not_taken(self._link.name, parameter.name, value, stays)
+                raise refusals.not_taken(self._link.name, parameter.name, value, found)
 
     def _arm(self) -> None:
         self._join_ticks()
         if not self._answer_until(State.RUN, arm=True):
-            state = "no state" if self._caller.sample is None else State(self._caller.sample.state).name
+            sample = self._caller.sample
+            state = State(sample.state).name if sample and sample.state in set(State) else "no state"
             raise refusals.not_armed(self._link.name, state, PATIENCE)
 
     def _answer_until(self, state: State, *, arm: bool = False, clear: bool = False) -> bool:
@@ -195,17 +199,16 @@ class Handshake:
         sample = self._caller.hear_sample(PATIENCE)
         if sample is None:
             return None
-        self._tick = nearest(self._tick, sample.tick, 8)
         self._say(arm=arm, clear=clear)
         return sample.state
 
     def _say(self, *, arm: bool = False, clear: bool = False, release: bool = False) -> None:
-        seq = self._tick & 0x1FFF
+        seq = self._caller.tick & 0x1FFF
         self._caller.say(Drive(0, seq, arm, clear, release, self._session, self._terms.watchdog_ms))
 
     def _join_ticks(self) -> None:
-        """Find the whole tick of which SAMPLE shows the low byte."""
-        self._tick = self._get(Parameter.TICK)
+        """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
+        self._get(Parameter.TICK)
 
     def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
         return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dcmp_hil.errors import OpenError
+from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+
+if TYPE_CHECKING:
+    from dcmp_hil.wire.messages import ParameterValue
 
 _FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
 
@@ -72,13 +78,17 @@ def faulty(name: str, fault: str) -> OpenError:
     )
 
 
-def not_taken(name: str, parameter: str, value: int, stays: int | None) -> OpenError:
+def not_taken(name: str, parameter: str, value: int, answer: ParameterValue | None) -> OpenError:
     """Make the error for a parameter that stays as it was."""
-    instead = "" if stays is None else f" and stays at {stays}"
+    why = "no answer" if answer is None else f"it stays at {answer.value}, {_result(answer.result)}"
     return OpenError(
-        f"{name}: the device does not take {parameter} = {value}{instead}. Use what it allows, or build "
-        "the firmware with a higher limit."
+        f"{name}: the device does not take {parameter} = {value} ({why}). Use what it allows, build the "
+        "firmware with a higher limit, or start again if another host was there a moment ago."
     )
+
+
+def _result(result: int) -> str:
+    return Result(result).name if result in set(Result) else f"result {result}"
 
 
 def not_told(name: str, parameter: str) -> OpenError:

@@ -14,7 +14,10 @@ import can
 if TYPE_CHECKING:
     from sim_backend.board import Board
 
-_PATIENT, _BRISK = 0.03, 0.002  # s, wall: how long a tick waits for the host's answer
+_PATIENT, _BRISK = (
+    1.0,
+    0.02,
+)  # s, wall: how long a tick waits for a host that drives, and for one that does not
 
 
 class Port(Protocol):
@@ -90,6 +93,7 @@ class Pump(threading.Thread):
     def __init__(self, board: Board, port: Port) -> None:
         super().__init__(name="board", daemon=True)
         self.board, self.port = board, port
+        self.patience = _PATIENT
         self.silent = threading.Event()  # set: the board neither ticks nor speaks
         self._ending = threading.Event()
 
@@ -99,7 +103,7 @@ class Pump(threading.Thread):
                 self._ending.wait(_BRISK)
                 continue
             self.board.tick()
-            self.port.exchange(self.board, _PATIENT if self.board.enable else _BRISK)
+            self.port.exchange(self.board, self.patience if self.board.enable else _BRISK)
 
     def close(self) -> None:
         """Stop, and wait until it has."""

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import pytest
 
+from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError, LinkError, OpenError, SampleTimeoutError, TripError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import protocol_hash
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop
+from sim_backend.sim_board import SimBoardBackend
 from tests.contract.benches import ALL, IN_PROCESS, PUMPED, WIRED, on_bench
 from tests.contract.hooks import Doubler, Dropper, Flipper, Swapper, on_way_down
 
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backends import Backend
     from dcmp_hil.values import Sample
     from tests.contract.benches import Bench
+    from tests.contract.hooks import Chunk
 
 T = 1e-3
 LIMIT = "amplifier.voltage_limit_V=5.0"
@@ -142,6 +145,7 @@ def test_lost_samples_show_as_a_larger_step_and_are_counted(kind: str) -> None:
         drive(backend, 0.5, 10)
         on_way_down(bench, dropper)
         before = backend.read().t
+        bench.hurry()
         dropper.count = 4
         backend.write(0.5)
         after = backend.read()
@@ -163,6 +167,7 @@ def test_samples_that_come_twice_count_once(kind: str) -> None:
 @wired
 def test_samples_out_of_order_never_turn_time_back(kind: str) -> None:
     with on_bench(kind) as bench, bench.device() as backend:
+        bench.hurry(0.05)
         on_way_down(bench, Swapper())
         times = [sample.t for sample in drive(backend, 0.5, 100)]
         assert all(later > earlier for earlier, later in pairwise(times))
@@ -173,6 +178,7 @@ def test_samples_out_of_order_never_turn_time_back(kind: str) -> None:
 @wired
 def test_damaged_samples_are_dropped_and_ridden_through(kind: str) -> None:
     with on_bench(kind) as bench, bench.device() as backend:
+        bench.hurry(0.05)
         on_way_down(bench, Flipper())
         samples = drive(backend, 0.5, 200)
         assert all(abs(sample.position) < 0.5 for sample in samples)
@@ -219,6 +225,7 @@ def test_stop_from_anyone_trips_with_its_code(kind: str) -> None:
 def test_host_that_falls_silent_finds_the_amplifier_off(kind: str) -> None:
     with on_bench(kind) as bench, bench.device() as backend:
         drive(backend, 1.0, 5)
+        bench.hurry()
         faults = [backend.read().fault for _ in range(40)]
         assert faults[0] == Fault.NONE
         assert faults[-1] == Fault.HOST_SILENT
@@ -329,3 +336,85 @@ def keep_driving(backend: Backend) -> Iterator[None]:
         ending.set()
         thread.join(5.0)
         assert not thread.is_alive()
+
+
+class Flood:
+    """Sends the same chunk over and over: a peer that babbles."""
+
+    on = False
+
+    def __call__(self, chunk: Chunk) -> Chunk:
+        return chunk * 200 if self.on else chunk
+
+
+@wired
+def test_a_peer_that_floods_holds_nothing_up(kind: str) -> None:
+    with on_bench(kind) as bench, bench.device() as backend:
+        flood = Flood()
+        on_way_down(bench, flood)
+        drive(backend, 0.5, 5)
+        flood.on = True
+        times = [sample.t for sample in drive(backend, 0.5, 5)]
+        flood.on = False
+        assert all(later > earlier for earlier, later in pairwise(times))
+
+
+@pytest.mark.parametrize("slept", [560, 620, 680, 740])
+def test_host_that_slept_does_not_take_another_hosts_run_for_its_own(slept: int) -> None:
+    """It is suspended, the device faults, another host takes over: none of it looks like its own run."""
+    with on_bench("sim-board can") as bench, ExitStack() as hosts:
+        clock = SimulatedClock()
+        first = SimBoardBackend(bench.rig, clock, bench.board)
+        hosts.enter_context(first)
+        drive(first, 1.0, 5)
+        for _ in range(slept):  # nobody answers: a fault, and the session lapses
+            bench.board.tick()
+            bench.board.transmit_frames()  # lost: the sleeper's buffer is full
+        assert bench.board.owner == 0
+        second = hosts.enter_context(SimBoardBackend(bench.rig, SimulatedClock(), bench.board))
+        drive(second, 2.0, 50)
+        clock.sleep_until_ns(int(1e6 * (slept + 100)))
+        with pytest.raises(LinkError, match="stood still") as woken:
+            first.read()
+        first.write(-5.0)
+        first.__exit__(LinkError, woken.value, None)
+        drive(second, 2.0, 2)
+        assert bench.board.applied_mV == 2000
+
+
+@wired
+def test_an_orderly_end_is_no_gap_in_the_sequence(kind: str) -> None:
+    with on_bench(kind) as bench:
+        backend = bench.device()
+        for _ in range(3):
+            run_into(backend, bench, None)
+        with backend:
+            drive(backend, 0.5, 120)
+        assert backend.health is not None
+        assert backend.health.sequence_gaps <= (0 if kind in IN_PROCESS else 20)  # a thread may miss some
+
+
+@pytest.mark.parametrize("kind", IN_PROCESS)
+def test_an_error_of_the_link_after_a_command_stops_the_device_at_once(kind: str) -> None:
+    with on_bench(kind) as bench:
+        backend = bench.device()
+        with pytest.raises(LinkError, match="odd"):
+            run_into(backend, bench, LinkError("odd"))
+        assert at_rest(bench)
+        assert bench.board.state == State.FAULT
+
+
+@pytest.mark.parametrize("kind", IN_PROCESS)
+def test_ctrl_c_while_arming_leaves_nothing_armed(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with on_bench(kind) as bench:
+        tick = bench.board.tick
+
+        def interrupted() -> None:
+            tick()
+            if bench.board.state == State.RUN:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(bench.board, "tick", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            bench.make().__enter__()
+        assert at_rest(bench)
