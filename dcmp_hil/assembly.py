@@ -14,6 +14,7 @@ from dcmp_hil.loop import Line
 from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins import find_named
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.probe import Probe
@@ -64,6 +65,7 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
         controller=controller,
         supervisor=make_supervisor(rig, recorder.event),
         telemetry=recorder,
+        overruns=Overruns(rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None),
         clock=clock,
         delay=rig.delay,
     )

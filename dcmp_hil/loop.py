@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.controllers import Controller
     from dcmp_hil.observers import Observer
+    from dcmp_hil.overruns import Overruns
     from dcmp_hil.predictor import Predictor
     from dcmp_hil.supervisor import Supervisor
     from dcmp_hil.trajectory import Trajectory
@@ -43,6 +44,7 @@ class Line:
     controller: Controller
     supervisor: Supervisor
     telemetry: Telemetry
+    overruns: Overruns
     clock: Clock
     delay: float  # s, from a sample to the instant at which its command acts
 
@@ -70,17 +72,20 @@ def run(line: Line, until: float, stop: Stop) -> float:
     ------
     TripError
         If the supervisor trips; 0 V has been written by then.
+    DeadlineError
+        If too many periods were late, and the rig says that this is the end.
     BackendError
         If the device or the way to it fails.
     """
     backend, trajectory, supervisor, clock, delay = (
         line.backend, line.trajectory, line.supervisor, line.clock, line.delay,
     )  # fmt: skip
-    observer, predictor, controller, telemetry = (
+    observer, predictor, controller, telemetry, overruns = (
         line.observer,
         line.predictor,
         line.controller,
         line.telemetry,
+        line.overruns,
     )
     previous, first = math.nan, math.nan
 
@@ -105,5 +110,6 @@ def run(line: Line, until: float, stop: Stop) -> float:
 
         if supervisor.trip is not None:
             raise supervisor.trip
+        overruns.look(timing)
         if sample.t >= until or stop.requested:
             return sample.t

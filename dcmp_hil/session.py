@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.errors import ConfigError, DeadlineError, TripError
+from dcmp_hil.host import host_facts, in_words
+from dcmp_hil.realtime import Grant, RealTime
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.statistics import Statistics, Summary
 from dcmp_hil.trajectory import LOWERING
@@ -46,6 +49,12 @@ class Result:
         Periods that telemetry lost because a sink was slow; they are in no figure.
     link
         What was lost or damaged on the way and survived; None where there is no wire.
+    grants
+        What was asked of the operating system and what came of it; empty in virtual time.
+    host
+        What is known of the computer; see `host_facts`.
+    overruns
+        Late periods of the whole run, by what `timing.overrun` calls late.
     """
 
     rig: Rig
@@ -54,6 +63,9 @@ class Result:
     events: tuple[Event, ...]
     dropped: int = 0
     link: LinkCounters | None = None
+    grants: tuple[Grant, ...] = ()
+    host: dict[str, Any] = field(default_factory=dict)
+    overruns: int = 0
 
 
 class Session:
@@ -98,6 +110,8 @@ class Session:
         own: list[Sink] = [self._statistics, *([self._keeper] if self._keeper else [])]
         clock = SimulatedClock() if fast else self._wall
         self.stop = stop or StopRequest()
+        self._realtime = None if fast else RealTime(rig.timing)
+        self._host = host_facts()
         self._line, self._recorder = assemble(rig, clock, [*own, *sinks], in_line=fast)
         self._realtime_factor = math.nan
 
@@ -108,27 +122,47 @@ class Session:
         ------
         TripError
             With the last second of cycles.
+        DeadlineError
+            If real time is enforced and was not to be had.
         BackendError
             If the device or the way to it fails.
         """
         line, recorder = self._line, self._recorder
         began_ns = self._wall.now_ns()
         try:
-            with self.stop, line.backend:
-                t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
-                if self.rig.run.end == "lower" and not self.stop.requested:
-                    recorder.event(Event(t, "INFO", "lowering the arm"))
-                    line.trajectory.lower(t + line.delay)
-                    loop.run(line, t + line.delay + LOWERING, self.stop)
+            # The backend last: collecting garbage with an armed device would cost it its watchdog.
+            with self.stop, self._realtime or nullcontext():
+                self._say_where()
+                began_ns = self._wall.now_ns()
+                with line.backend:
+                    self._run_line()
         except TripError as trip:
             trip.cycles = tuple(recorder.recent)
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
+            raise
+        except DeadlineError as error:
+            recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
             raise
         finally:
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.event(Event(recorder.t, "INFO", "amplifier at 0 V"))
             recorder.close()
+
+    def _run_line(self) -> None:
+        line, recorder = self._line, self._recorder
+        t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
+        if self.rig.run.end == "lower" and not self.stop.requested:
+            recorder.event(Event(t, "INFO", "lowering the arm"))
+            line.trajectory.lower(t + line.delay)
+            loop.run(line, t + line.delay + LOWERING, self.stop)
+
+    def _say_where(self) -> None:
+        """Tell of the computer, and of what it did not grant."""
+        self._recorder.event(Event(0.0, "INFO", in_words(self._host)))
+        for grant in self._realtime.grants if self._realtime else ():
+            said = "granted" if grant.granted else grant.refusal
+            self._recorder.event(Event(0.0, "INFO", f"{grant.what}: {said}"))
 
     def result(self) -> Result:
         """Return what there is, complete or not."""
@@ -139,6 +173,9 @@ class Session:
             events=tuple(self._keeper.events) if self._keeper else (),
             dropped=self._recorder.dropped,
             link=getattr(self._line.backend, "counters", None),
+            grants=tuple(self._realtime.grants) if self._realtime else (),
+            host=self._host,
+            overruns=self._line.overruns.count,
         )
 
 

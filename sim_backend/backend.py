@@ -38,6 +38,7 @@ class SimBackend:
     def __init__(self, rig: Rig, clock: Clock) -> None:
         self._pace = Pace(clock, rig.period)
         self._period = rig.period
+        self._skips = rig.timing.overrun == "skip"
         self._tick = 0
         self._plant = make_plant(rig)
         self._encoder = make_encoder(rig)
@@ -65,6 +66,8 @@ class SimBackend:
     def read(self) -> Sample:
         """Advance the plant to the next tick and return what its encoder shows.
 
+        Under `timing.overrun = "skip"` that is the newest tick that is due, like a device's newest sample.
+
         Raises
         ------
         LinkError
@@ -72,14 +75,21 @@ class SimBackend:
         """
         if not self._amplifier.live:
             raise LinkError("The simulated rig is closed. Use it as a context manager: with backend: ...")
-        voltage = 0.0
-        if self._tick:
-            voltage = self._amplifier.step()
-            self._truth = self._plant.advance(voltage)
-        tick = self._tick
+        voltage, tick = 0.0, self._tick
+        if tick:
+            voltage = self._advance()
+            for _ in range(self._pace.missed(tick) if self._skips else 0):
+                voltage = self._advance()
+                tick += 1
         self._tick = tick + 1
         self._pace.wait_for(tick)
         return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+
+    def _advance(self) -> float:
+        """Let a period pass; return the voltage that it had, V."""
+        voltage = self._amplifier.step()
+        self._truth = self._plant.advance(voltage)
+        return voltage
 
     def write(self, voltage: float) -> None:
         """Hand a voltage to the amplifier, V."""

@@ -30,6 +30,11 @@ class Pace:
         """Make this instant that of tick 0."""
         self._start_ns = self._clock.now_ns()
 
+    def missed(self, tick: int) -> int:
+        """Count the ticks after `tick` whose instants have passed as well."""
+        behind_ns = self._clock.now_ns() - self._start_ns - int(tick * self._period_ns + 0.5)
+        return int(behind_ns / self._period_ns) if 0 < behind_ns <= _FORGIVEN_NS else 0
+
     def wait_for(self, tick: int) -> None:
         """Return no earlier than the instant of `tick`."""
         deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)

@@ -10,6 +10,7 @@ import pytest
 from dcmp_hil import loop, run
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import TripError
+from dcmp_hil.overruns import Overruns
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench
 
@@ -73,6 +74,7 @@ class _Stages:
             controller=self.stage({"update": works}),
             supervisor=self.stage({"engages": lambda _: self._tick == 1, "admit": self.admit}),
             telemetry=self.stage({"record": lambda _: None}),
+            overruns=Overruns(1e-3),
             clock=clock,
             delay=0.001,
         )

@@ -128,6 +128,9 @@ def _conclude(
         "ended_by": ended_by,
         "dropped_periods": result.dropped,
         "link": None if result.link is None else asdict(result.link),
+        "overruns": result.overruns,
+        "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
+        "host": result.host,
     }
     if options.json_file != "-":
         console.out.print(summary_table(session.rig, result, ended_by))

@@ -17,7 +17,7 @@ def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
     """Lay the figures out: what, value, unit; then the durations, a quantile a column."""
     start, stop = result.summary.window_s
     title = Text.assemble((rig.name, "bold"), f"  {start:.2f} to {stop:.2f} s, ended by {ended_by}")
-    return Group(title, "", _figures(result), "", _durations(result))
+    return Group(title, "", _figures(result), "", _durations(result), *_refusals(result))
 
 
 def _figures(result: Result) -> Table:
@@ -53,9 +53,23 @@ def _durations(result: Result) -> Table:
     table.add_column("µs", no_wrap=True)
     for quantile in ("p50", "p99", "p99.9", "max"):
         table.add_column(quantile, justify="right", no_wrap=True)
-    for what, values in (("period", result.summary.period_us), ("lateness", result.summary.lateness_us)):
+    figures = result.summary
+    for what, values in (
+        ("period", figures.period_us),
+        ("lateness", figures.lateness_us),
+        ("sample to command", figures.compute_us),
+    ):
         table.add_row(what, *(f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max)))
     return table
+
+
+def _refusals(result: Result) -> list[Text]:
+    """Say what of real time the system did not grant, a line each."""
+    refused = [grant for grant in result.grants if not grant.granted]
+    lines = [
+        Text.assemble((grant.what, "yellow"), f" was not granted: {grant.refusal}.") for grant in refused
+    ]
+    return [Text(), *lines] if lines else []
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:

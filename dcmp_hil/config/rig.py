@@ -19,6 +19,7 @@ from dcmp_hil.config.sections import (
     RunSection,
     SimSection,
     SupervisorSection,
+    TimingSection,
 )
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
@@ -103,6 +104,7 @@ class Rig(Section):
     controller: ControllerSection = PdSettings()
     reference: ReferenceSection = Sine()
     supervisor: SupervisorSection = SupervisorSection()
+    timing: TimingSection = TimingSection()
     run: RunSection = RunSection()
     sim: SimSection = SimSection()
 

@@ -130,6 +130,23 @@ class SupervisorSection(Section):
     """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
 
 
+class TimingSection(Section):
+    """`[timing]`: what a run in real time asks of the operating system, and what it does when it is late."""
+
+    realtime: Literal["try", "enforce", "off"] = "try"
+    """`try`: take what the system grants, and say what not; `enforce`: refuse to start without it, exit 5."""
+    priority: Annotated[int, Field(ge=2, le=98)] = 80
+    """SCHED_FIFO priority of the loop; the threads that look on get 1."""
+    cpu: Annotated[int, Field(ge=0, le=4095)] | Literal["any"] = "any"
+    """Number of the one CPU that the loop runs on, or "any"."""
+    switch_interval_us: Annotated[int, Field(ge=10, le=5000)] = 100
+    """Python threads that look on hand the interpreter back after this long, us."""
+    overrun: Literal["hold", "skip", "stop"] = "hold"
+    """A late period: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""
+    overrun_limit: Annotated[int, Field(ge=1, le=20)] = 5
+    """`stop` ends the run at this many late ones of 20 periods; late is half a period, or slower than one."""
+
+
 class RunSection(Section):
     """`[run]`: when and how a run ends."""
 

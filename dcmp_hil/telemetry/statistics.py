@@ -48,6 +48,10 @@ class Summary:
     """Periods whose sample arrived more than half a period late."""
     period_us: Percentiles
     lateness_us: Percentiles
+    compute_us: Percentiles
+    """From a sample's arrival to its command's departure."""
+    rate_error_ppm: float | None
+    """By how much samples came too slowly (+) by the host's clock, from both ends of the window."""
     realtime_factor: float
     """Device time over wall time, the whole run."""
     window_s: tuple[float, float]
@@ -124,11 +128,12 @@ class Statistics:
         self._period = period
         self._from, self._to = window_from, window_to
         self._tracking, self._velocity, self._disturbance = Error(), Error(), Error()
-        self.period, self.lateness = Durations(), Durations()
+        self.period, self.lateness, self.compute = Durations(), Durations(), Durations()
         self._periods = self._late = 0
         self._peak = self._variation = 0.0
         self._last_voltage = math.nan
         self._first_t = self._last_t = math.nan
+        self._first_lateness = self._last_lateness = math.nan
 
     def block(self, block: Block) -> None:
         """Take consecutive periods."""
@@ -142,12 +147,13 @@ class Statistics:
         self._disturbance.add((block["disturbance_estimate"] - block["disturbance_true"])[window])
         self.period.add(block["period"][window])
         self.lateness.add(block["lateness"][window])
+        self.compute.add(block["compute"][window])
         self._periods += len(inside)
         self._late += int((block["lateness"][window] > _LATE * self._period).sum())
         self._add_voltage(block["voltage_sent"][window])
         if math.isnan(self._first_t):
-            self._first_t = float(t[window][0])
-        self._last_t = float(t[window][-1])
+            self._first_t, self._first_lateness = float(t[window][0]), float(block["lateness"][window][0])
+        self._last_t, self._last_lateness = float(t[window][-1]), float(block["lateness"][window][-1])
 
     def event(self, event: Event) -> None:
         """Events are no figures."""
@@ -170,6 +176,8 @@ class Statistics:
             late_periods=self._late,
             period_us=self.period.percentiles(),
             lateness_us=self.lateness.percentiles(),
+            compute_us=self.compute.percentiles(),
+            rate_error_ppm=1e6 * (self._last_lateness - self._first_lateness) / span if span > 0 else None,
             realtime_factor=realtime_factor,
             window_s=(self._first_t, self._last_t + self._period)
             if self._periods

@@ -16,7 +16,8 @@ Cli = Callable[..., Outcome]
 PROMISED = {
     *("tracking_rms_rad", "tracking_max_rad", "velocity_error_rms_rad_s", "velocity_error_max_rad_s"),
     *("disturbance_error_rms_rad_s2", "voltage_peak_V", "voltage_tv_V_s", "periods", "late_periods"),
-    *("period_us", "lateness_us", "realtime_factor", "window_s"),
+    *("period_us", "lateness_us", "compute_us", "rate_error_ppm", "realtime_factor", "window_s"),
+    *("overruns", "realtime", "host"),
 }
 
 
@@ -27,9 +28,17 @@ def test_run_gives_promised_keys_when_json_goes_to_stdout(cli: Cli) -> None:
     assert figures.keys() >= PROMISED
     assert figures["periods"] == 1000
     assert figures["window_s"] == pytest.approx([1.0, 2.0])
-    assert set(figures["period_us"]) == set(figures["lateness_us"]) == {"p50", "p99", "p999", "max"}
+    assert (
+        set(figures["period_us"])
+        == set(figures["lateness_us"])
+        == set(figures["compute_us"])
+        == {"p50", "p99", "p999", "max"}
+    )
     assert figures["period_us"]["max"] == 1000.0  # us, virtual time
-    assert figures["late_periods"] == 0
+    assert figures["late_periods"] == figures["overruns"] == 0
+    assert figures["rate_error_ppm"] == pytest.approx(0.0, abs=1e-6)
+    assert figures["realtime"] == {}  # virtual time asks for nothing
+    assert figures["host"]["cpus"] >= 1
 
 
 def test_run_equals_python_api_when_rig_is_the_same(cli: Cli) -> None:
@@ -69,6 +78,7 @@ def test_run_shows_every_figure_when_on_screen(cli: Cli) -> None:
         "disturbance error",
         "total variation",
         "lateness",
+        "sample to command",
         "speed",
     ):
         assert words in outcome.out

@@ -163,3 +163,13 @@ def test_statistics_have_no_figures_when_nothing_ran() -> None:
     assert got.tracking_max_rad is None
     assert got.voltage_tv_V_s is None
     assert got.window_s == (2.0, 2.0)
+
+
+def test_statistics_tell_what_a_command_takes_and_how_fast_the_clocks_part() -> None:
+    columns, reference = _run(1, 1000)
+    columns["compute"] = np.linspace(10e-6, 20e-6, 1000)
+    columns["lateness"] = 250e-6 * columns["t"]  # a device whose clock is 250 ppm slow
+    got = _figures(columns, reference, [300, 600], window=(0.1, 0.9))
+    assert got.compute_us.p50 == pytest.approx(15.0, rel=0.01)
+    assert got.compute_us.max == pytest.approx(19.0, rel=0.001)
+    assert got.rate_error_ppm == pytest.approx(250.0)

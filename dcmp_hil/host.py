@@ -1,0 +1,90 @@
+"""What kind of computer a run was on: facts of the operating system that decide how late a loop can be."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+from pathlib import Path
+from typing import Any
+
+_CAN_NICE, _CAN_LOCK = 23, 14  # bits of CAP_SYS_NICE and CAP_IPC_LOCK in linux/capability.h
+_FLAVOURS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the longer names first
+_GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
+_MODEL = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
+_THROTTLE = "/proc/sys/kernel/sched_rt_runtime_us"
+
+
+def host_facts() -> dict[str, Any]:
+    """Return what there is to say about this computer; None where it does not tell.
+
+    Returns
+    -------
+    dict
+        ``system``, ``kernel``, ``preemption``, ``cpus`` (those this process may use), ``governor`` (of the
+        first), ``rt_runtime_us`` (of each second, for real-time threads; -1 for all of it), ``privileges``
+        and ``python``.
+    """
+    throttle = read_fact(_THROTTLE)
+    return {
+        "system": platform.system(),
+        "kernel": platform.release(),
+        "preemption": preemption(platform.version(), read_fact(_MODEL)),
+        "cpus": len(os.sched_getaffinity(0)),
+        "governor": read_fact(_GOVERNOR),
+        "rt_runtime_us": None if throttle is None else int(throttle),
+        "privileges": privileges(),
+        "python": f"{platform.python_implementation()} {platform.python_version()}",
+    }
+
+
+def in_words(facts: dict[str, Any]) -> str:
+    """Return the facts as one line."""
+    return ", ".join(f"{name} {'unknown' if fact is None else fact}" for name, fact in facts.items())
+
+
+def privileges() -> dict[str, Any]:
+    """Return what this process may: the limits of `ulimit`, and the capabilities beyond them."""
+    held = capabilities(read_fact("/proc/self/status") or "")
+    locked, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    return {
+        "uid": os.geteuid(),
+        "cap_sys_nice": bool(held >> _CAN_NICE & 1),
+        "cap_ipc_lock": bool(held >> _CAN_LOCK & 1),
+        "rtprio_limit": resource.getrlimit(resource.RLIMIT_RTPRIO)[0],
+        "memlock_limit": "unlimited" if locked == resource.RLIM_INFINITY else locked,
+    }
+
+
+def capabilities(status: str) -> int:
+    """Return the effective capabilities as a bit mask, from /proc/self/status; 0 if it is silent."""
+    for line in status.splitlines():
+        if line.startswith("CapEff:"):
+            return int(line.removeprefix("CapEff:"), 16)
+    return 0
+
+
+def preemption(version: str, model: str | None) -> str:
+    """Name the preemption model of a kernel.
+
+    Parameters
+    ----------
+    version
+        As `uname -v` says it.
+    model
+        What a dynamic kernel says about the model in force, such as ``none voluntary (full)``; None if it
+        may not be read.
+    """
+    words = version.split()
+    flavour = next((name for name in _FLAVOURS if name in words), "none")
+    if model and "(" in model:
+        return f"{flavour} ({model.split('(')[1].split(')')[0]})"
+    return flavour
+
+
+def read_fact(path: str) -> str | None:
+    """Return the text of a small file of the kernel's; None where there is none, or none for us."""
+    try:
+        return Path(path).read_text("utf-8").strip() or None
+    except OSError:
+        return None

@@ -1,0 +1,69 @@
+"""Periods that ran late: counted, and under `timing.overrun = "stop"` the end of the run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.errors import DeadlineError
+
+if TYPE_CHECKING:
+    from dcmp_hil.values import Timing
+
+_LATE = 0.5  # of a period
+_WINDOW = 20  # periods
+_LEAK = 0.01  # of a period a period: no device's clock is further off than 1 %
+_MASK = (1 << _WINDOW) - 1
+
+
+class Overruns:
+    """Looks at the timing of each period.
+
+    A period is late if its sample came more than half a period after its instant, or if its command took
+    longer than a period. A device's clock runs off the host's, so the instant is that of the most punctual
+    sample, forgotten by 1 % of a period a period.
+
+    Parameters
+    ----------
+    period
+        s, nominal.
+    limit
+        Late ones of the last 20 periods that end the run; None for as many as there are.
+
+    Attributes
+    ----------
+    count
+        Late periods so far.
+    """
+
+    def __init__(self, period: float, limit: int | None = None) -> None:
+        self.count = 0
+        self._period, self._limit = period, limit
+        self._punctual = 0.0  # s, lateness of the most punctual sample
+        self._recent = 0  # a bit a period, the newest last
+
+    def look(self, timing: Timing) -> None:
+        """Take the timing of one period.
+
+        Raises
+        ------
+        DeadlineError
+            If too many were late.
+        """
+        lateness, period = timing.lateness, self._period
+        punctual = self._punctual + _LEAK * period
+        self._punctual = punctual = min(lateness, punctual)
+        late = lateness - punctual > _LATE * period or timing.compute > period
+        self._recent = recent = (self._recent << 1 | late) & _MASK
+        if late:
+            self.count += 1
+            if self._limit is not None and recent.bit_count() >= self._limit:
+                self._give_up(timing)
+
+    def _give_up(self, timing: Timing) -> None:
+        behind = timing.lateness - self._punctual
+        raise DeadlineError(
+            f"{self._recent.bit_count()} of the last {_WINDOW} periods of {1e6 * self._period:.0f} us were "
+            f"late; the last sample by {1e6 * behind:.0f} us, its command took {1e6 * timing.compute:.0f} us."
+            " Close other programs, lower loop.rate_hz, see what the summary says was not granted, or set "
+            'timing.overrun = "hold".'
+        )
