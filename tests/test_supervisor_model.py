@@ -1,0 +1,89 @@
+"""The host's table of states, searched exhaustively: what must hold, and that the search would notice."""
+
+from __future__ import annotations
+
+import copy
+from itertools import product
+
+import pytest
+
+from dcmp_hil.supervisor import TABLE, Cue, Phase
+
+Table = dict[Phase, dict[Cue, Phase]]
+Path = tuple[Phase, ...]
+
+
+def table() -> Table:
+    return {phase: dict(cues) for phase, cues in TABLE.items()}
+
+
+def paths(of: Table) -> list[Path]:
+    """Return every way from ARMING on that visits no phase twice but the last."""
+    found: list[Path] = []
+    open_: list[Path] = [(Phase.ARMING,)]
+    while open_:
+        path = open_.pop()
+        found.append(path)
+        for following in set(of[path[-1]].values()):
+            if path.count(following) == 0:
+                open_.append((*path, following))
+            else:
+                found.append((*path, following))
+    return found
+
+
+def violations(of: Table) -> list[str]:
+    """Return what does not hold of a table."""
+    every = paths(of)
+    wrong = []
+    if of[Phase.TRIPPED]:
+        wrong.append("something leads out of TRIPPED")
+    wrong += [
+        f"a fault does not lead from {phase} to TRIPPED"
+        for phase in Phase
+        if phase is not Phase.TRIPPED and of[phase].get(Cue.FAULT) is not Phase.TRIPPED
+    ]
+    for path in every:
+        steps = [phase for phase in path if phase is not Phase.TRIPPED]
+        places = [ORDER.index(phase) for phase in steps]
+        if places != sorted(set(places)):
+            wrong.append(f"it goes back: {path}")
+        if Phase.RUNNING in path and not {Phase.SETTLING, Phase.ENGAGING} <= set(path):
+            wrong.append(f"full authority without settling and ramp: {path}")
+    reached = {phase for path in every for phase in path}
+    wrong += [f"{phase} is never reached" for phase in Phase if phase not in reached]
+    wrong += [
+        f"{cue} leads from {phase}, and nothing else may lead to full authority"
+        for phase, cue in product(Phase, Cue)
+        if of[phase].get(cue) is Phase.RUNNING and cue is not Cue.ENGAGED
+    ]
+    return wrong
+
+
+def test_table_holds_what_it_must() -> None:
+    assert violations(table()) == []
+
+
+SEEDED = {
+    "out of TRIPPED": (Phase.TRIPPED, Cue.ARMED, Phase.PROBING),
+    "straight to RUNNING": (Phase.ARMING, Cue.ARMED_UNPROBED, Phase.RUNNING),
+    "no settling after the probe": (Phase.PROBING, Cue.PROBED, Phase.ENGAGING),
+    "no ramp": (Phase.SETTLING, Cue.SETTLED, Phase.RUNNING),
+    "a fault that only starts again": (Phase.ENGAGING, Cue.FAULT, Phase.SETTLING),
+    "back to the probe": (Phase.RUNNING, Cue.SETTLED, Phase.PROBING),
+}
+
+
+@pytest.mark.parametrize("error", SEEDED, ids=str)
+def test_search_finds_a_seeded_error(error: str) -> None:
+    phase, cue, following = SEEDED[error]
+    changed = copy.deepcopy(table())
+    changed[phase][cue] = following
+    assert violations(changed)
+
+
+@pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.TRIPPED])
+def test_search_finds_a_fault_that_leads_nowhere(phase: Phase) -> None:
+    changed = table()
+    del changed[phase][Cue.FAULT]
+    assert violations(changed)
