@@ -12,6 +12,8 @@ from dcmp_hil.supervisor import TABLE, Cue, Phase
 Table = dict[Phase, dict[Cue, Phase]]
 Path = tuple[Phase, ...]
 
+ORDER = [Phase.ARMING, Phase.PROBING, Phase.SETTLING, Phase.ENGAGING, Phase.RUNNING]
+
 
 def table() -> Table:
     return {phase: dict(cues) for phase, cues in TABLE.items()}
