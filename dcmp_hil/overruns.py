@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 _LATE = 0.5  # of a period
 _WINDOW = 20  # periods
 _LEAK = 0.01  # of a period a period: no device's clock is further off than 1 %
+_WARM = 0.1  # s: the first periods find nothing in the caches, and the amplifier still at 0 V
 _MASK = (1 << _WINDOW) - 1
 
 
@@ -20,7 +21,7 @@ class Overruns:
 
     A period is late if its sample came more than half a period after its instant, or if its command took
     longer than a period. A device's clock runs off the host's, so the instant is that of the most punctual
-    sample, forgotten by 1 % of a period a period.
+    sample, forgotten by 1 % of a period a period. The first 0.1 s are counted and end nothing.
 
     Parameters
     ----------
@@ -40,6 +41,7 @@ class Overruns:
         self._period, self._limit = period, limit
         self._punctual = 0.0  # s, lateness of the most punctual sample
         self._recent = 0  # a bit a period, the newest last
+        self._cold = round(_WARM / period)  # periods to go
 
     def look(self, timing: Timing) -> None:
         """Take the timing of one period.
@@ -53,11 +55,13 @@ class Overruns:
         punctual = self._punctual + _LEAK * period
         self._punctual = punctual = min(lateness, punctual)
         late = lateness - punctual > _LATE * period or timing.compute > period
+        self.count += late
+        if self._cold:
+            self._cold -= 1
+            return
         self._recent = recent = (self._recent << 1 | late) & _MASK
-        if late:
-            self.count += 1
-            if self._limit is not None and recent.bit_count() >= self._limit:
-                self._give_up(timing)
+        if late and self._limit is not None and recent.bit_count() >= self._limit:
+            self._give_up(timing)
 
     def _give_up(self, timing: Timing) -> None:
         behind = timing.lateness - self._punctual

@@ -1,9 +1,9 @@
 """Real time: what a paced run asks of the operating system, each thing tried, reported, and undone.
 
 Why none of it can lock the machine or starve telemetry: the loop sleeps until its next tick, and gives up CPU
-and interpreter lock with that. Should a late loop never get to sleep, RLIMIT_RTTIME brings SIGXCPU after
-0.5 s and every thread goes back to normal; should Python not get to run that handler, the kernel keeps 5 % of
-each second for everybody else. Whoever looks on runs below the loop, and gets the interpreter lock within the
+and interpreter lock with that. Should a late loop not get to sleep for 80 ms, RLIMIT_RTTIME brings SIGXCPU
+and every thread goes back to normal; should Python not get to run that handler, the kernel keeps 5 % of each
+second for everybody else. Whoever looks on runs below the loop, and gets the interpreter lock within the
 switch interval. Children start as normal processes.
 """
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config.sections import TimingSection
 
 _HELPERS = 1  # the lowest real-time priority
-_LONGEST = 500_000  # us that a real-time thread may run without a sleep
+_LONGEST = 80_000  # us that a real-time thread may run without a sleep; telemetry wakes it every 100 ms
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall
 _TIMER_SLACK = 29  # prctl: PR_SET_TIMERSLACK
 _USUAL_SLACK = 0  # ns; 0 means: as the process began
@@ -127,8 +127,8 @@ class RealTime:
         self.grants.append(
             Grant(
                 "SCHED_FIFO to the end",
-                f"taken back after {1e-6 * _LONGEST:g} s without a sleep. The periods take longer than they "
-                "last: lower loop.rate_hz",
+                f"taken back after {1e-3 * _LONGEST:.0f} ms without a sleep. If that happens again, a period "
+                "has more to do than time for it: lower loop.rate_hz",
             )
         )
 

@@ -141,7 +141,8 @@ class Session:
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
             raise
         except DeadlineError as error:
-            recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
+            if recorder.recent:  # refused before it began, it is no event of the run
+                recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
             raise
         finally:
             wall = 1e-9 * (self._wall.now_ns() - began_ns)

@@ -24,17 +24,23 @@ _LATE = Timing(1.6 * T, 0.6 * T, 20e-6)
 _SLOW = Timing(T, 0.0, 1.1 * T)
 
 
-def test_overruns_count_nothing_when_every_period_is_on_time() -> None:
-    overruns = Overruns(T, 1)
+def _warm(limit: int | None = None) -> Overruns:
+    """Return one that has seen its first 0.1 s."""
+    overruns = Overruns(T, limit)
     for _ in range(100):
         overruns.look(_ON_TIME)
+    return overruns
+
+
+def test_overruns_count_nothing_when_every_period_is_on_time() -> None:
+    overruns = _warm(1)
     overruns.look(Timing(math.nan, 0.49 * T, T))
     assert overruns.count == 0
 
 
 @pytest.mark.parametrize("timing", [_LATE, _SLOW])
 def test_overruns_end_the_run_at_their_limit_of_twenty(timing: Timing) -> None:
-    overruns = Overruns(T, 5)
+    overruns = _warm(5)
     for _ in range(4):  # every fifth: the fourth of twenty
         overruns.look(timing)
         for _ in range(4):
@@ -49,6 +55,16 @@ def test_overruns_end_the_run_at_their_limit_of_twenty(timing: Timing) -> None:
         overruns.look(timing)
     assert caught.value.exit_code == 5
     assert "timing.overrun" in str(caught.value)
+
+
+def test_overruns_end_nothing_while_everything_is_cold() -> None:
+    overruns = Overruns(T, 1)
+    for _ in range(100):
+        overruns.look(_SLOW)
+    overruns.look(_ON_TIME)
+    assert overruns.count == 100
+    with pytest.raises(DeadlineError):
+        overruns.look(_SLOW)
 
 
 def test_overruns_only_count_when_there_is_no_limit() -> None:
@@ -67,8 +83,7 @@ def test_overruns_forgive_a_device_whose_clock_is_off(ppm: float) -> None:
 
 
 def test_overruns_see_lateness_when_the_first_sample_was_late_itself() -> None:
-    overruns = Overruns(T, 1)
-    overruns.look(Timing(math.nan, 0.0, 20e-6))
+    overruns = _warm(1)
     overruns.look(Timing(T, -0.8 * T, 20e-6))
     with pytest.raises(DeadlineError):
         overruns.look(Timing(T, 0.0, 20e-6))

@@ -94,7 +94,7 @@ def test_realtime_takes_all_of_it_and_gives_it_back(system: _System, helper: int
         assert not gc.isenabled()
         assert gc.get_freeze_count() > 0
         assert sys.getswitchinterval() == pytest.approx(250e-6)
-        assert resource.getrlimit(resource.RLIMIT_RTTIME)[0] == 500_000
+        assert resource.getrlimit(resource.RLIMIT_RTTIME)[0] == 80_000
         fifo = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         assert system.priorities()[mine] == [(fifo, 70)]
         assert system.priorities()[helper] == [(fifo, 1)]  # below the loop, above every normal program
