@@ -81,6 +81,7 @@ def test_ports_sees_a_device_in_use_on_a_bus_and_leaves_it_alone(
         monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
         with found.device() as backend:
             drive(backend, 1.0, 20)
+            found.hurry()
             outcome = cli("ports")
     assert "in use by a host" in outcome.out
     assert f"interface=virtual --set backend.channel={channel}" in outcome.out
