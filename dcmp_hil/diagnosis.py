@@ -62,16 +62,16 @@ class Diagnosis:
 
     def __init__(self, ku: float, period: float) -> None:
         self._ku = ku
-        self._seen: deque[tuple[float, float, float]] = deque(maxlen=max(_FEWEST, round(_WINDOW / period)))
-
-    def add(self, sample: Sample) -> None:
-        """Remember a sample."""
-        self._seen.append((sample.t, sample.position, sample.voltage))
+        self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / period)))
+        self.add = self._seen.append
+        """Remember a sample; called every period, so there is no function around it."""
 
     def finding(self) -> Finding:
         """Say what the last samples look like."""
-        t, position, voltage = np.array(self._seen, float).T
-        if len(t) < _FEWEST or not np.isfinite(position).all():
+        if len(self._seen) < _FEWEST:
+            return _OTHER
+        t, position, voltage, _ = np.array(self._seen, float).T
+        if not np.isfinite(position).all():
             return _OTHER
         if np.ptp(position) == 0.0:
             return _STUCK

@@ -55,13 +55,14 @@ class Overruns:
         punctual = self._punctual + _LEAK * period
         self._punctual = punctual = min(lateness, punctual)
         late = lateness - punctual > _LATE * period or timing.compute > period
-        self.count += late
         if self._cold:
             self._cold -= 1
-            return
-        self._recent = recent = (self._recent << 1 | late) & _MASK
-        if late and self._limit is not None and recent.bit_count() >= self._limit:
-            self._give_up(timing)
+            self.count += late
+        elif late or self._recent:
+            self.count += late
+            self._recent = recent = (self._recent << 1 | late) & _MASK
+            if late and self._limit is not None and recent.bit_count() >= self._limit:
+                self._give_up(timing)
 
     def _give_up(self, timing: Timing) -> None:
         behind = timing.lateness - self._punctual

@@ -91,12 +91,15 @@ class Supervisor:
         self._since = math.nan  # s, device time at which the present phase began
         self._push = 0.0  # V, what the probe wants
         self.phase = Phase.ARMING
+        self._has_authority = False  # in RUNNING; asked every period
         self.trip: TripError | None = None
         self.clamped = 0  # periods in which the demand was more than the limit
         self._clamp_said = -math.inf
 
     def engages(self, sample: Sample) -> bool:
         """Move on to the phase of this period; True in the first of ENGAGING, when the trajectory starts."""
+        if self._has_authority:
+            return False
         if self.phase is Phase.ARMING:
             self._cue(Cue.ARMED if self._probe else Cue.ARMED_UNPROBED, sample.t)
         if self.phase is Phase.PROBING:
@@ -118,14 +121,12 @@ class Supervisor:
             _check_finite(sample, demand)
         except TripError as trip:
             self._trip(trip, sample.t)
-        if self.phase is Phase.TRIPPED:
-            return 0.0
+        limit = self._limit if self._has_authority else self._growing_limit(sample.t)
         if self.phase is Phase.PROBING:
             return self._push
-        limit = self._limit if self.phase is Phase.RUNNING else self._growing_limit(sample.t)
         if -limit <= demand <= limit:
             return demand
-        if self.phase is Phase.RUNNING:  # before, the limit is meant to bite
+        if self._has_authority:  # before, the limit is meant to bite
             self._note_clamp(sample.t, demand, limit)
         return limit if demand > 0.0 else -limit
 
@@ -155,7 +156,7 @@ class Supervisor:
             )
 
     def _growing_limit(self, t: float) -> float:
-        """Return the authority before RUNNING, V; full authority ends ENGAGING."""
+        """Return the authority in every phase but RUNNING, V; full authority ends ENGAGING."""
         if self.phase is not Phase.ENGAGING:
             return 0.0
         gone = t - self._since
@@ -168,6 +169,7 @@ class Supervisor:
         following = TABLE[self.phase].get(cue)
         if following is not None:
             self.phase, self._since = following, t
+            self._has_authority = following is Phase.RUNNING
             self._notify(Event(t, "PHASE", following.value))
 
 

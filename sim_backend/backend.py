@@ -77,19 +77,21 @@ class SimBackend:
             raise LinkError("The simulated rig is closed. Use it as a context manager: with backend: ...")
         voltage, tick = 0.0, self._tick
         if tick:
-            voltage = self._advance()
-            for _ in range(self._pace.missed(tick) if self._skips else 0):
-                voltage = self._advance()
-                tick += 1
+            voltage = self._amplifier.step()
+            self._truth = self._plant.advance(voltage)
+            if self._skips:
+                voltage, tick = self._skip_to_newest(voltage, tick)
         self._tick = tick + 1
         self._pace.wait_for(tick)
         return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
 
-    def _advance(self) -> float:
-        """Let a period pass; return the voltage that it had, V."""
-        voltage = self._amplifier.step()
-        self._truth = self._plant.advance(voltage)
-        return voltage
+    def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
+        """Let the periods pass that are due already; return the voltage of the last one, V, and its tick."""
+        for _ in range(self._pace.missed(tick)):
+            voltage = self._amplifier.step()
+            self._truth = self._plant.advance(voltage)
+            tick += 1
+        return voltage, tick
 
     def write(self, voltage: float) -> None:
         """Hand a voltage to the amplifier, V."""
