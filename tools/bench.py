@@ -20,6 +20,7 @@ from dcmp_hil.observers import Setting
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Cycle, Sample
+from tools.bench_lateness import Lateness, lateness, period_us
 from tools.bench_wire import codec_us, round_trips
 
 if TYPE_CHECKING:
@@ -127,6 +128,7 @@ def _rows() -> list[Row]:
             lambda: _line_factor(load_rig("bench-1khz", ["backend.kind=sim-board"]), telemetry=False),
         ),
         _row("encode a DRIVE and decode a SAMPLE, COBS", "us", "<= 2", codec_us),
+        _row("one period on the host, bytes to bytes, with its record", "us", "<= 12", period_us),
         *_wire_rows(),
         _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
         _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
@@ -141,6 +143,20 @@ def _wire_rows() -> list[Row]:
         _row_of("round trip to the native firmware, message to message", firmware, "us", ""),
         _row_of("plain pyserial echo, as many bytes", echo, "us", ""),
         _row_of("ratio of the two", ratios, "x", "<= 2"),
+    ]
+
+
+def _lateness_rows(found: Lateness) -> list[Row]:
+    """Rows of one rate: C, the loop, the loop with a recording; taken in turn."""
+    at = f"{found.rate / 1e3:g} kHz, p99.9"
+    return [
+        _row_of(f"lateness at {at}, C clock_nanosleep", found.c, "us", ""),
+        _row_of(f"lateness at {at}, the loop", found.ours, "us", ""),
+        _row_of(f"lateness at {at}, the loop with a recording", found.recorded, "us", ""),
+        Row("ratio of the medians, the loop to C", *found.ratio(found.ours), "x", found.goal),
+        Row("ratio of the medians, with a recording", *found.ratio(found.recorded), "x", found.goal),
+        _row_of("mean rate error", found.rate_error, "%", "+-0.01"),
+        _row_of("drift", found.drift, "us/s", "0"),
     ]
 
 
@@ -162,8 +178,13 @@ def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, default=Path("bench.json"), metavar="FILE")
-    target: Path = parser.parse_args().json
+    parser.add_argument("--seconds", type=float, default=3.0, help="of each run that measures lateness")
+    parser.add_argument("--rounds", type=int, default=10, help="of runs that measure lateness, in turn")
+    asked = parser.parse_args()
+    target: Path = asked.json
     rows = _rows()
+    for rate in (1000.0, 10_000.0):
+        rows += _lateness_rows(lateness(rate, asked.rounds, asked.seconds))
     figures = [_figures(step) for step in (20.0, 200.0, 500.0)]
     write = sys.stdout.write
     write(f"{'':56}{'median':>10}{'min':>10}{'max':>10}  unit  goal\n")

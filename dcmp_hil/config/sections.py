@@ -139,7 +139,7 @@ class TimingSection(Section):
     """SCHED_FIFO priority of the loop; the threads that look on get 1."""
     cpu: Annotated[int, Field(ge=0, le=4095)] | Literal["any"] = "any"
     """Number of the one CPU that the loop runs on, or "any"."""
-    switch_interval_us: Annotated[int, Field(ge=10, le=5000)] = 100
+    switch_interval_us: Annotated[int, Field(ge=20, le=5000)] = 100  # at 10 us nobody gets far any more
     """Python threads that look on hand the interpreter back after this long, us."""
     overrun: Literal["hold", "skip", "stop"] = "hold"
     """A late period: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""

@@ -7,15 +7,18 @@ from functools import partial
 from typing import TYPE_CHECKING, Literal
 from uuid import uuid4
 
+import numpy as np
 import rerun as rr
 
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.blueprint import dashboard
 from dcmp_hil.telemetry.display import display_available
 from dcmp_hil.telemetry.frames import Frames
 from dcmp_hil.telemetry.outlet import Outlet
+from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.scenery import log_scenery, log_style
 from dcmp_hil.values import Event
 
@@ -23,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.frames import Call
     from dcmp_hil.telemetry.outlet import Job
     from dcmp_hil.telemetry.rig_view import RigView
@@ -87,6 +89,7 @@ class RerunSink:
         self._outlets: list[Outlet] = []
         self._application, self._recording = application, str(uuid4())
         rr.unregister_shutdown()
+        _warm_up(rig)
         if record is not None:
             self._open_file(record)
         if viewer == "connect":
@@ -209,6 +212,15 @@ def _begin(
 def _log_styles(plots: dict[str, list[Signal]], stream: rr.RecordingStream) -> None:
     for plot, signals in plots.items():
         log_style(stream, plot, signals)
+
+
+def _warm_up(rig: RigView) -> None:
+    """Make the calls of a block for nobody: the first ones take 80 ms, and the loop would wait for them."""
+    frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))), np.zeros((2, 3)))
+    frames.choose_lines(block)
+    stream = rr.RecordingStream("warm-up")
+    _send([*frames.of_block(block), frames.of_event(Event(0.0, "INFO", ""))], stream)
+    stream.disconnect()
 
 
 def _send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
