@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from sim_backend.fault_kinds.injection import Injection
 
 
 class SimBackend:
@@ -50,11 +51,16 @@ class SimBackend:
             delay_samples=rig.loop.delay_samples,
         )
         self._truth = Truth(rig.sim.position_rad, 0.0, math.nan)
+        self._faults: Injection | None = getattr(rig.backend, "injection", None)
+        if self._faults:
+            self._plant, self._encoder = self._faults.attach_plain(self._plant, self._encoder, clock)
 
     def __enter__(self) -> Self:
         """Switch the amplifier on, at 0 V."""
         self._amplifier.live = True
         self._pace.start()
+        if self._faults:
+            self._faults.opened()
         return self
 
     def __exit__(
@@ -83,7 +89,8 @@ class SimBackend:
                 voltage, tick = self._skip_to_newest(voltage, tick)
         self._tick = tick + 1
         self._pace.wait_for(tick)
-        return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+        sample = Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+        return sample if self._faults is None else self._faults.sample(sample)
 
     def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
         """Let the periods pass that are due already; return the voltage of the last one, V, and its tick."""
@@ -95,6 +102,8 @@ class SimBackend:
 
     def write(self, voltage: float) -> None:
         """Hand a voltage to the amplifier, V."""
+        if self._faults:
+            self._faults.witness.wrote(voltage)
         self._amplifier.command(voltage)
 
     def truth(self) -> Truth:

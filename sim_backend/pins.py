@@ -12,6 +12,7 @@ from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
+    from sim_backend.fault_kinds.injection import Injection
 
 _WORD = 0xFFFF_FFFF
 
@@ -43,6 +44,10 @@ class Pins:
             self._stage.command(voltage)
             voltage = self._stage.step()
         self.truth = self._plant.advance(voltage)
+
+    def befall(self, faults: Injection) -> None:
+        """Let faults come between the pins and the plant."""
+        self._plant, self._encoder = faults.plant(self._plant), faults.encoder(self._encoder)
 
     def count(self) -> int:
         """Return what the encoder's counter shows, 32 bits."""

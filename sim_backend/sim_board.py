@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.config.backends import SimBoard
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from dcmp_hil.values import Truth
+    from dcmp_hil.values import Sample, Truth
+    from sim_backend.fault_kinds.injection import Injection
 
 _CARRIERS = {"cobs": cobs, "slcan": slcan}
 
@@ -43,8 +44,31 @@ class SimBoardBackend(DeviceBackend):
     def __init__(self, rig: Rig, clock: Clock, board: Board | None = None) -> None:
         if not isinstance(rig.backend, SimBoard):
             raise ConfigError(f'backend.kind: got "{rig.backend.kind}"; expected "sim-board".')
-        self.board = board or Board(rig, carrier=rig.backend.carrier)
-        super().__init__(rig, BoardLink(self.board, rig.backend.carrier, Pace(clock, rig.period)), clock)
+        carrier, pace = rig.backend.carrier, Pace(clock, rig.period)
+        self._faults: Injection | None = getattr(rig.backend, "injection", None)
+        faults, there = self._faults, board or getattr(rig.backend, "injection_board", None)
+        arguments = faults.board_arguments() if faults else {}
+        self.board: Board = there or Board(rig, carrier=carrier, **arguments)
+        make = faults.attach if faults else BoardLink
+        super().__init__(rig, make(self.board, carrier, pace), clock)
+
+    def __enter__(self) -> Self:
+        """Open it as any device; faults count their time from here."""
+        super().__enter__()
+        if self._faults:
+            self._faults.opened()
+        return self
+
+    def read(self) -> Sample:
+        """Wait for the next SAMPLE and return the newest, if nothing goes wrong."""
+        sample = super().read()
+        return self._faults.sample(sample) if self._faults else sample
+
+    def write(self, voltage: float) -> None:
+        """Send a voltage, V; a number that is not finite is sent as 0 V."""
+        if self._faults:
+            self._faults.witness.wrote(voltage)
+        super().write(voltage)
 
     def truth(self) -> Truth:
         """Return the true state at the last sample."""
@@ -99,12 +123,15 @@ class BoardLink:
         """Return the next frame; where there is none and time to wait, the board ticks first."""
         frames = self._frames
         if not frames and timeout > 0.0:
-            self._ticks += 1
-            self._pace.wait_for(self._ticks)
-            self._board.tick()
+            self._let_tick()
         if not frames:
             self._fetch()
         return frames.popleft() if frames else None
+
+    def _let_tick(self) -> None:
+        self._ticks += 1
+        self._pace.wait_for(self._ticks)
+        self._board.tick()
 
     def _fetch(self) -> None:
         if self._receiver is None:

@@ -19,7 +19,7 @@ class Viewer(StrEnum):
     NONE = "none"
 
 
-def run(
+def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     rig: RigName = "bench-1khz",
     overrides: Overrides = None,
     duration: Annotated[
@@ -44,6 +44,14 @@ def run(
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no folder under runs/.")] = False,
     json_file: JsonFile = None,
     note: Annotated[str, typer.Option(metavar="TEXT", help="Kept with the run's figures.")] = "",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="KIND[:KEY=VALUE,...]",
+            help="Let something go wrong, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
+        ),
+    ] = None,
 ) -> None:
     """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
 
@@ -60,5 +68,6 @@ def run(
         keep=not no_record,
         json_file=json_file,
         note=note,
+        faults=tuple(faults or ()),
     )
     raise typer.Exit(execute(rig, overrides or (), options))

@@ -15,6 +15,7 @@ from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import TripError
+from dcmp_hil.plugins import find_named
 from dcmp_hil.session import Session
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.recorder import Sink
 
+_FAULTS = "sim_backend.faults:with_faults"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 
 
@@ -38,6 +40,7 @@ class Options:
     keep: bool
     json_file: str | None
     note: str
+    faults: tuple[str, ...] = ()
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
@@ -45,6 +48,8 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     rig = load_rig(rig_name, overrides)
     for sentence in warnings(rig):
         console.warn(sentence)
+    if options.faults:
+        rig = find_named(_FAULTS, "--fault")(rig, options.faults)
     with StopRequest() as stop:  # from here on: opening a viewer takes its time, too
         return _run(rig, options, stop)
 
@@ -124,6 +129,7 @@ def _conclude(
         **asdict(result.summary),
         "rig": session.rig.name,
         "note": options.note,
+        "faults": options.faults,
         "version": __version__,
         "ended_by": ended_by,
         "dropped_periods": result.dropped,

@@ -1,0 +1,1 @@
+"""What can go wrong with a simulated rig, level by level: wire, firmware, plant, host."""

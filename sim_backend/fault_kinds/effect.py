@@ -1,0 +1,115 @@
+"""What every fault has: parameters with units and bounds, luck of its own, and a time when it is on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Callable, Mapping
+
+    from sim_backend.board import Board
+
+Value = float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A parameter that is a number.
+
+    Parameters
+    ----------
+    unit
+        As people write it; empty for none.
+    low, high
+        Bounds, both allowed.
+    default
+        What holds if nothing is said.
+    """
+
+    unit: str
+    low: float
+    high: float
+    default: float
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A parameter that is a word; the first one is the default."""
+
+    words: tuple[str, ...]
+
+
+class Setup(NamedTuple):
+    """What faults may know of the rig that they befall."""
+
+    carrier: str  # `cobs`, `slcan` or `can`; empty where there is no wire
+    period: float  # s
+    ku: float  # (rad/s2)/V, of the plant
+    believed_ku: float  # the same, of [model]
+    count_rad: float  # one count of the encoder
+    node: int  # of the device
+
+
+class Effect:
+    """A fault while it is being injected; what it does depends on its level.
+
+    Parameters
+    ----------
+    setup
+        Of the rig.
+    luck
+        Its own, so that one fault more changes nothing about the others.
+    params
+        All of its kind's, in the kind's units.
+    """
+
+    on = False
+
+    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
+        self.setup, self.luck = setup, luck
+        self._params = params
+
+    def number(self, name: str) -> float:
+        """Return a parameter that is a number."""
+        return float(self._params[name])
+
+    def word(self, name: str) -> str:
+        """Return a parameter that is a word."""
+        return str(self._params[name])
+
+    def periods(self, name: str) -> int:
+        """Return a parameter in ms as periods, at least one."""
+        return max(1, round(1e-3 * self.number(name) / self.setup.period))
+
+    def begin(self) -> None:
+        """Start: the first period in which it is on."""
+
+    def end(self) -> None:
+        """Stop: the first period in which it is off again."""
+
+    def tick(self, board: Board | None) -> None:
+        """Let a period begin in which it is on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of fault.
+
+    Parameters
+    ----------
+    make
+        Makes its effect.
+    says
+        What it is, in a few words.
+    params
+        By name.
+    wired
+        Whether it needs a device on a wire, which the plain simulated rig is not.
+    """
+
+    make: Callable[..., Effect]
+    says: str
+    params: Mapping[str, Number | Choice] = field(default_factory=dict)
+    wired: bool = False

@@ -1,0 +1,138 @@
+"""Faults of a device, and what strangers send to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
+from dcmp_hil.wire.frame import Frame
+from dcmp_hil.wire.messages import Drive, Hello, Identity, Stop
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+from sim_backend.fault_kinds.effect import Effect, Kind, Number
+from sim_backend.fault_kinds.wire import WireEffect
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from dcmp_hil.wire.messages import Message
+    from sim_backend.board import Board
+    from sim_backend.fault_kinds.wire import Way
+
+_CARRIERS: dict[str, Any] = {"cobs": cobs, "slcan": slcan}
+_SEQ, _WORD = 0x1FFF, 2.0**32 - 1
+
+
+class Reset(Effect):
+    """Resets the board once."""
+
+    _done = False
+
+    def tick(self, board: Board | None) -> None:
+        """Press the button."""
+        if board is not None and not self._done:
+            board.reset()
+        self._done = True
+
+
+class Stranger(Effect):
+    """Says something to the device that its host has not said; `times` times, one a period."""
+
+    _said = 0
+
+    def tick(self, board: Board | None) -> None:
+        """Say it."""
+        if board is not None and self._said < self.number("times"):
+            self._said += 1
+            board.receive_frame(*pack(self.message(board), self.setup.node))
+
+    def message(self, board: Board) -> Message:  # noqa: ARG002
+        """Return what is said."""
+        return Stop(round(self.number("reason")))
+
+    def other(self, board: Board) -> int:
+        """Return a session that does not own the device."""
+        number = self.luck.randrange(1, 0xFFFF)
+        return number + (number >= board.owner > 0)
+
+
+class StrangeHello(Stranger):
+    """Another host wants the device."""
+
+    def message(self, board: Board) -> Message:
+        """Ask for it."""
+        return Hello(self.other(board), PROTOCOL_HASH)
+
+
+class StrangeDrive(Stranger):
+    """Another host drives the device."""
+
+    def message(self, board: Board) -> Message:
+        """Ask for a voltage."""
+        seq = (board.tick_count - 1) & _SEQ
+        return Drive(round(1e3 * self.number("V")), seq, True, False, False, self.other(board), 20)
+
+
+class OtherVersion(WireEffect):
+    """The device says that it speaks another protocol."""
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
+        """Change what IDENTITY says."""
+        frames = self._frames(piece)
+        message = self._understood(frames[0]) if way == "down" and len(frames) == 1 else None
+        if not isinstance(message, Identity):
+            return (piece,)
+        other = message._replace(protocol_hash=PROTOCOL_HASH ^ 1, mismatch=True, owned=False)
+        return (self._piece(pack(other, self.setup.node)),)
+
+    def _understood(self, frame: Frame) -> Message | None:
+        try:
+            return unpack(frame, self.setup.node)
+        except CorruptFrameError:
+            return None
+
+    def _frames(self, piece: bytes) -> list[Frame]:
+        if self.setup.carrier == "can":
+            return [Frame(int.from_bytes(piece[:2], "little"), piece[2:])]
+        frames: list[Frame] = _CARRIERS[self.setup.carrier].Receiver().feed(piece)
+        return frames
+
+    def _piece(self, frame: Frame) -> bytes:
+        if self.setup.carrier == "can":
+            return frame.id.to_bytes(2, "little") + frame.data
+        encoded: bytes = _CARRIERS[self.setup.carrier].encode(frame)
+        return encoded
+
+
+class Start(Effect):
+    """Boots the device with counters near their wrap; only `at=boot` means anything."""
+
+
+_TIMES = Number("", 1, 1e6, 1)
+FIRMWARE = {
+    "firmware.reset": Kind(Reset, "the device is reset", wired=True),
+    "firmware.stop": Kind(
+        Stranger,
+        "somebody sends STOP",
+        {"reason": Number("", 0, 255, 3), "times": _TIMES},
+        wired=True,
+    ),
+    "firmware.hello": Kind(StrangeHello, "another host wants the device", {"times": _TIMES}, wired=True),
+    "firmware.drive": Kind(
+        StrangeDrive,
+        "another host drives the device",
+        {"V": Number("V", -32, 32, 5), "times": _TIMES},
+        wired=True,
+    ),
+    "firmware.version": Kind(OtherVersion, "the device speaks another protocol", wired=True),
+    "firmware.start": Kind(
+        Start,
+        "the device boots with its counters here",
+        {
+            "us": Number("us", 0, _WORD, 0xFFFF_0000),
+            "tick": Number("", 0, _WORD, 0),
+            "count": Number("counts", -(2.0**31), 2.0**31 - 1, 0),
+        },
+        wired=True,
+    ),
+}

@@ -1,0 +1,156 @@
+"""Faults of a host: numbers that are none, code that raises, and time that passes unnoticed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.values import Estimate, Sample
+
+_NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+class InjectedError(Exception):
+    """What `host.raise` raises, as a bug in somebody's controller would."""
+
+
+class InjectedBaseError(BaseException):
+    """The same, beyond `except Exception`."""
+
+
+class HostEffect(Effect):
+    """Between the stages of a period."""
+
+    elapse: Callable[[float], None]
+    """Lets time pass, s, without the host noticing; whoever injects gives it."""
+
+    def sample(self, sample: Sample) -> Sample:
+        """Return what the loop reads."""
+        return sample
+
+    def estimate(self, estimate: Estimate) -> Estimate:
+        """Return what the observer says."""
+        return estimate
+
+    def demand(self, demand: float) -> float:
+        """Return what the controller asks for."""
+        return demand
+
+
+class Spoil(HostEffect):
+    """A number of the period is none."""
+
+    def sample(self, sample: Sample) -> Sample:
+        """Spoil one of its numbers."""
+        return sample._replace(**self._spoilt("sample"))
+
+    def estimate(self, estimate: Estimate) -> Estimate:
+        """Spoil x1, x2 or w."""
+        return estimate._replace(**self._spoilt("estimate"))
+
+    def demand(self, demand: float) -> float:
+        """Spoil it."""
+        return self._value if self.word("where") == "demand" else demand
+
+    @property
+    def _value(self) -> float:
+        return _NUMBERS[self.word("value")]
+
+    def _spoilt(self, stage: str) -> dict[str, Any]:
+        where, _, name = self.word("where").partition(".")
+        return {name: self._value} if where == stage else {}
+
+
+class Raise(HostEffect):
+    """Observer or controller raises."""
+
+    def estimate(self, estimate: Estimate) -> Estimate:
+        """Raise instead."""
+        if self.word("where") == "observer":
+            self._raise()
+        return estimate
+
+    def demand(self, demand: float) -> float:
+        """Raise instead."""
+        if self.word("where") == "controller":
+            self._raise()
+        return demand
+
+    def _raise(self) -> None:
+        kinds = {"exception": InjectedError, "base": InjectedBaseError}
+        raise kinds[self.word("what")](f"injected: {self.word('in')}")
+
+
+class Diverge(HostEffect):
+    """The observer's estimate grows without bound, as with a wrong gain."""
+
+    _factor = 1.0
+
+    def estimate(self, estimate: Estimate) -> Estimate:
+        """Make it larger every period."""
+        self._factor *= self.number("factor")
+        grown = self._factor - 1.0
+        x1, x2, w = estimate
+        return estimate._replace(position=x1 + 1e-3 * grown, velocity=x2 + grown, disturbance=w + grown)
+
+
+class Slow(HostEffect):
+    """The controller takes its time, now and then, or `times` times at the most."""
+
+    _left: int | None = None
+
+    def demand(self, demand: float) -> float:
+        """Take it."""
+        left = round(self.number("times")) if self._left is None else self._left
+        if left and self.luck.random() < self.number("p"):
+            left -= 1
+            self.elapse(1e-3 * self.number("ms") * (1.0 + self.number("more") * self.luck.random()))
+        self._left = left
+        return demand
+
+
+class Late(Slow):
+    """The host wakes up late, before it reads."""
+
+    def sample(self, sample: Sample) -> Sample:
+        """Sleep on; the sample is an old one when it is used."""
+        super().demand(0.0)
+        return sample
+
+    def demand(self, demand: float) -> float:
+        """Leave it."""
+        return demand
+
+
+def _pauses(ms: float, times: float, p: float = 1.0) -> dict[str, Number | Choice]:
+    return {
+        "ms": Number("ms", 0.01, 1000, ms),
+        "more": Number("", 0, 100, 0),
+        "times": Number("", 1, 1e6, times),
+        "p": Number("", 0, 1, p),
+    }
+
+
+_STAGES = (
+    *("sample.position", "sample.voltage", "sample.t"),
+    *("estimate.position", "estimate.velocity", "estimate.disturbance", "demand"),
+)
+HOST = {
+    "host.spoil": Kind(
+        Spoil, "a number is none", {"where": Choice(_STAGES), "value": Choice(tuple(_NUMBERS))}
+    ),
+    "host.raise": Kind(
+        Raise,
+        "somebody's class raises",
+        {"where": Choice(("controller", "observer")), "what": Choice(("exception", "base"))},
+    ),
+    "host.diverge": Kind(Diverge, "the observer diverges", {"factor": Number("", 1.001, 10, 1.5)}),
+    "host.slow": Kind(Slow, "the controller is slow", _pauses(2, 1e6)),
+    "host.delay": Kind(Late, "the host wakes up late", _pauses(3, 1)),
+    "host.pauses": Kind(Slow, "the host stands still now and then", _pauses(20, 1e6, 0.01)),
+}

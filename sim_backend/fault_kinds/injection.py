@@ -1,0 +1,230 @@
+"""The faults of one run, switched on and off period by period."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import TYPE_CHECKING, NamedTuple
+
+from sim_backend.fault_kinds.firmware import Start
+from sim_backend.fault_kinds.host import HostEffect
+from sim_backend.fault_kinds.link import FaultyLink
+from sim_backend.fault_kinds.plant import FaultyEncoder, FaultyPlant, PlantEffect
+from sim_backend.fault_kinds.wire import WireEffect
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dcmp_hil.clock import Clock
+    from dcmp_hil.values import Estimate, Sample, Truth
+    from sim_backend.board import Board
+    from sim_backend.encoder import Encoder
+    from sim_backend.fault_kinds.effect import Effect, Setup
+    from sim_backend.fault_kinds.wire import Way
+    from sim_backend.faults import Fault
+    from sim_backend.pace import Pace
+    from sim_backend.plant import Plant
+
+
+class Moment(NamedTuple):
+    """What a predicate may look at."""
+
+    tick: int  # periods since the backend was opened
+    t: float  # s, the same
+    truth: Truth  # of the plant
+
+
+class Witness:
+    """Sees everything that passes; by default it does not look."""
+
+    def attached(self, board: Board | None) -> None:
+        """Meet the board; None on the plain simulated rig."""
+
+    def heard(self, piece: bytes) -> None:
+        """See what reaches the board."""
+
+    def said(self, piece: bytes) -> None:
+        """See what the board sends, before the wire has it."""
+
+    def fetched(self) -> None:
+        """See the board after its tick."""
+
+    def wrote(self, voltage: float) -> None:
+        """See what the host's loop hands to its backend, V."""
+
+
+class Timer:
+    """When a fault is on.
+
+    Parameters
+    ----------
+    fault
+        With its time.
+    effect
+        Of it.
+    period
+        s.
+    """
+
+    def __init__(self, fault: Fault, effect: Effect, period: float) -> None:
+        self.effect = effect
+        self.began: int | None = None  # tick
+        self._when = fault.at if callable(fault.at) else None
+        self._first = 0.0 if callable(fault.at) else _ticks(fault.at, period)
+        self._length = _ticks(fault.for_, period)
+
+    def look(self, moment: Moment) -> None:
+        """Switch it on or off."""
+        if self.began is None:
+            if self._when(moment) if self._when else moment.tick >= self._first:
+                self.began = moment.tick
+                self.effect.on = True
+                self.effect.begin()
+        elif self.effect.on and moment.tick - self.began >= self._length:
+            self.effect.on = False
+            self.effect.end()
+
+
+def _ticks(time: float | str, period: float) -> float:
+    """Return an instant or a length in periods: whole numbers are, other numbers are seconds."""
+    if isinstance(time, str):
+        return -math.inf  # `boot`
+    return time if isinstance(time, int) or math.isinf(time) else round(time / period)
+
+
+class Injection:
+    """A plan at work on one backend.
+
+    Parameters
+    ----------
+    faults
+        The plan's.
+    seed
+        The plan's.
+    setup
+        Of the rig.
+    witness
+        Who looks on.
+    """
+
+    def __init__(self, faults: Sequence[Fault], seed: int, setup: Setup, witness: Witness) -> None:
+        self.witness = witness
+        self.board: Board | None = None
+        self.timers: list[Timer] = []
+        self._setup = setup
+        self._boot: Start | None = None
+        self._tick = 0
+        self._open = False
+        self._truth: Callable[[], Truth]
+        for place, fault in enumerate(faults):
+            luck = random.Random(f"{seed} {place} {fault.kind}")  # noqa: S311 - it must repeat itself
+            effect = fault.make(setup, luck)
+            self.timers.append(Timer(fault, effect, setup.period))
+            if isinstance(effect, Start):
+                self._boot = effect
+        effects = [timer.effect for timer in self.timers]
+        self._wire = [effect for effect in effects if isinstance(effect, WireEffect)]
+        self._plant = [effect for effect in effects if isinstance(effect, PlantEffect)]
+        self._host = [effect for effect in effects if isinstance(effect, HostEffect)]
+
+    def board_arguments(self) -> dict[str, int]:
+        """Return how a board is to boot."""
+        start = self._boot
+        if start is None:
+            return {}
+        return {
+            "start_us": round(start.number("us")),
+            "first_tick": round(start.number("tick")),
+            "count_offset": round(start.number("count")),
+        }
+
+    def attach(self, board: Board, carrier: str, pace: Pace) -> FaultyLink:
+        """Take hold of a board; return the line to it."""
+        self.board = board
+        board.pins.befall(self)
+        self._truth = board.truth
+        link = FaultyLink(board, carrier, pace, self)
+        for effect in self._host:
+            effect.elapse = lambda seconds: link.elapse(round(seconds / self._setup.period))
+        self.witness.attached(board)
+        self._look()
+        return link
+
+    def attach_plain(self, plant: Plant, encoder: Encoder, clock: Clock) -> tuple[Plant, Encoder]:
+        """Take hold of a plain simulated rig, where time that passes is the clock's alone."""
+        for effect in self._host:
+            effect.elapse = lambda seconds: clock.sleep_until_ns(clock.now_ns() + round(1e9 * seconds))
+        faulty = FaultyPlant(plant, self, ticking=True)
+        self._truth = lambda: faulty.truth
+        self.witness.attached(None)
+        self._look()
+        return faulty, self.encoder(encoder)
+
+    def plant(self, plant: Plant) -> Plant:
+        """Return a plant as it is with these faults."""
+        return FaultyPlant(plant, self, ticking=False)
+
+    def encoder(self, encoder: Encoder) -> Encoder:
+        """Return an encoder as it is with these faults."""
+        return FaultyEncoder(encoder, self) if self._plant else encoder
+
+    def opened(self) -> None:
+        """Call the first sample, which the host is about to read, that of tick 0."""
+        self._tick, self._open = 0 if self.board is None else -1, True  # a board ticks first
+
+    def tick(self) -> None:
+        """Let a period begin."""
+        self._tick += 1
+        self._look()
+        for timer in self.timers:
+            if timer.effect.on:
+                timer.effect.tick(self.board)
+
+    def _look(self) -> None:
+        tick = self._tick if self._open else -(10**9)
+        moment = Moment(tick, tick * self._setup.period, self._truth())
+        for timer in self.timers:
+            timer.look(moment)
+
+    @property
+    def now(self) -> int:
+        """Periods since the backend was opened."""
+        return self._tick
+
+    def passed(self, piece: bytes, way: Way) -> list[bytes]:
+        """Return what arrives at once of a piece."""
+        pieces = [piece]
+        for effect in self._wire:
+            if effect.affects(way):
+                pieces = [end for start in pieces for end in effect.change(start, way)]
+        return pieces
+
+    def released(self, way: Way) -> list[bytes]:
+        """Return what arrives now of earlier pieces."""
+        return [piece for effect in self._wire for piece in effect.released(way)]
+
+    @property
+    def acting_on_plant(self) -> list[PlantEffect]:
+        """Those that are on."""
+        return [effect for effect in self._plant if effect.on]
+
+    def sample(self, sample: Sample) -> Sample:
+        """Return what the loop reads."""
+        for effect in self._host:
+            if effect.on:
+                sample = effect.sample(sample)
+        return sample
+
+    def estimate(self, estimate: Estimate) -> Estimate:
+        """Return what the observer says."""
+        for effect in self._host:
+            if effect.on:
+                estimate = effect.estimate(estimate)
+        return estimate
+
+    def demand(self, demand: float) -> float:
+        """Return what the controller asks for, V."""
+        for effect in self._host:
+            if effect.on:
+                demand = effect.demand(demand)
+        return demand

@@ -1,0 +1,270 @@
+"""Faults of iron: encoder, motor, power stage, and people."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from dcmp_hil.values import UNKNOWN_TRUTH
+from sim_backend.encoder import Encoder
+from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+
+if TYPE_CHECKING:
+    from dcmp_hil.values import Truth
+    from sim_backend.plant import Plant
+
+
+class PlantEffect(Effect):
+    """Between the amplifier's output and the motor, and between the shaft and the counter."""
+
+    def voltage(self, volts: float) -> float:
+        """Return what the motor sees, V; an acceleration is that many volts."""
+        return volts
+
+    def count(self, counts: float) -> float:
+        """Return what the counter shows; asked in every period, in which it is on."""
+        return counts
+
+
+class Acting(Protocol):
+    """Whoever knows which faults are on."""
+
+    @property
+    def acting_on_plant(self) -> list[PlantEffect]:
+        """Those that are on."""
+        ...
+
+    def tick(self) -> None:
+        """Let a period begin."""
+        ...
+
+
+class FaultyPlant:
+    """A plant behind a faulty amplifier.
+
+    Parameters
+    ----------
+    plant
+        The plant.
+    acting
+        What goes wrong.
+    ticking
+        Whether its time is that of the faults.
+    """
+
+    def __init__(self, plant: Plant, acting: Acting, *, ticking: bool) -> None:
+        self._plant, self._acting, self._ticking = plant, acting, ticking
+        self.truth = UNKNOWN_TRUTH
+
+    def advance(self, voltage: float) -> Truth:
+        """Hold for a period what becomes of `voltage` (V); w of the truth has the difference."""
+        if self._ticking:
+            self._acting.tick()
+        seen, ku = voltage, 0.0
+        for effect in self._acting.acting_on_plant:
+            seen, ku = effect.voltage(seen), effect.setup.believed_ku
+        truth = self._plant.advance(seen)
+        self.truth = truth._replace(disturbance=truth.disturbance + ku * (seen - voltage))
+        return self.truth
+
+
+class FaultyEncoder(Encoder):
+    """An encoder whose count something happens to.
+
+    Parameters
+    ----------
+    encoder
+        The encoder.
+    acting
+        What goes wrong.
+    """
+
+    def __init__(self, encoder: Encoder, acting: Acting) -> None:
+        self._encoder, self._acting = encoder, acting
+
+    def read(self, position: float) -> float:
+        """Return the measured position, rad."""
+        measured = self._encoder.read(position)
+        for effect in self._acting.acting_on_plant:
+            measured = effect.setup.count_rad * effect.count(measured / effect.setup.count_rad)
+        return measured
+
+    def count(self, position: float) -> int:
+        """Return the counter at a position (rad)."""
+        count: float = self._encoder.count(position)
+        for effect in self._acting.acting_on_plant:
+            count = effect.count(count)
+        return round(count)
+
+
+class Stuck(PlantEffect):
+    """Shows the last count for ever."""
+
+    _shown: float | None = None
+
+    def begin(self) -> None:
+        """Forget an earlier time."""
+        self._shown = None
+
+    def count(self, counts: float) -> float:
+        """Show the first one again."""
+        if self._shown is None:
+            self._shown = counts
+        return self._shown
+
+
+class Jump(PlantEffect):
+    """Adds counts, `times` times, `every` periods apart, and they stay."""
+
+    _age = -1
+
+    def count(self, counts: float) -> float:
+        """Add what has come together."""
+        self._age += 1
+        jumps = min(self._age // round(self.number("every")) + 1, round(self.number("times")))
+        return counts + jumps * round(self.number("counts"))
+
+
+class Glitch(PlantEffect):
+    """Shows a wrong count in one period in so many."""
+
+    _age = -1
+
+    def count(self, counts: float) -> float:
+        """Be wrong, or not."""
+        self._age += 1
+        ordinal, rest = divmod(self._age, round(self.number("every")))
+        wrong = rest == 0 and ordinal < self.number("times")
+        return counts + round(self.number("counts")) if wrong else counts
+
+
+class Noise(PlantEffect):
+    """Adds Gaussian noise, in whole counts."""
+
+    def count(self, counts: float) -> float:
+        """Add some."""
+        return counts + round(self.luck.gauss(0.0, self.number("counts")))
+
+
+class Missed(PlantEffect):
+    """Loses counts for ever, each with probability p."""
+
+    _last: float | None = None
+    _lost = 0
+
+    def count(self, counts: float) -> float:
+        """Lose some of the new ones."""
+        moved = 0 if self._last is None else round(counts - self._last)
+        self._last = counts
+        lost = sum(self.luck.random() < self.number("p") for _ in range(min(abs(moved), 1000)))
+        self._lost += lost if moved > 0 else -lost
+        return counts - self._lost
+
+
+class EncoderSign(PlantEffect):
+    """Counts the other way from where it is."""
+
+    _from: float | None = None
+
+    def count(self, counts: float) -> float:
+        """Mirror it."""
+        if self._from is None:
+            self._from = counts
+        return 2.0 * self._from - counts
+
+
+class Scale(PlantEffect):
+    """Has so many times as many counts a revolution as anybody knows."""
+
+    def count(self, counts: float) -> float:
+        """Count otherwise."""
+        return math.floor(counts * self.number("factor") + 0.5)
+
+
+class Gain(PlantEffect):
+    """The motor sees so many times the voltage: 0 without power, -1 with its wires swapped."""
+
+    def voltage(self, volts: float) -> float:
+        """Scale it."""
+        return volts * self.number("factor")
+
+
+class Power(PlantEffect):
+    """The motor has no power."""
+
+    def voltage(self, volts: float) -> float:  # noqa: ARG002
+        """Give none."""
+        return 0.0
+
+
+class MotorSign(PlantEffect):
+    """The motor's wires are swapped."""
+
+    def voltage(self, volts: float) -> float:
+        """Turn it round."""
+        return -volts
+
+
+class Saturation(PlantEffect):
+    """The power stage gives no more than so much, and nobody is told."""
+
+    def voltage(self, volts: float) -> float:
+        """Cut it off."""
+        most = self.number("V")
+        return max(-most, min(most, volts))
+
+
+class Offset(PlantEffect):
+    """The power stage adds a voltage, while it is switched on or not."""
+
+    def voltage(self, volts: float) -> float:
+        """Add it."""
+        return volts + self.number("V")
+
+
+class DeadBand(PlantEffect):
+    """The power stage gives nothing below so much."""
+
+    def voltage(self, volts: float) -> float:
+        """Cut it out."""
+        return 0.0 if abs(volts) < self.number("V") else volts
+
+
+class Shove(PlantEffect):
+    """Somebody pushes the arm, one way or the other."""
+
+    _volts = 0.0
+
+    def begin(self) -> None:
+        """Choose a way."""
+        sign = {"up": 1, "down": -1}.get(self.word("way")) or self.luck.choice((-1, 1))
+        self._volts = sign * self.number("rad_s2") / self.setup.ku
+
+    def voltage(self, volts: float) -> float:
+        """Add what gives this acceleration."""
+        return volts + self._volts
+
+
+_COUNTS = Number("counts", -1e6, 1e6, 1000)
+_OFTEN = {"times": Number("", 1, 1e6, 1), "every": Number("periods", 1, 1e6, 3)}
+_VOLTS = {"V": Number("V", 0, 100, 1)}
+PLANT = {
+    "plant.enc_stuck": Kind(Stuck, "the encoder shows one position for ever"),
+    "plant.enc_jump": Kind(Jump, "the count jumps, and stays", {"counts": _COUNTS, **_OFTEN}),
+    "plant.enc_glitch": Kind(Glitch, "the count is wrong for a period", {"counts": _COUNTS, **_OFTEN}),
+    "plant.enc_noise": Kind(Noise, "the encoder is noisy", {"counts": Number("counts", 0, 1e4, 1)}),
+    "plant.enc_missed": Kind(Missed, "counts get lost", {"p": Number("", 0, 1, 0.02)}),
+    "plant.enc_sign": Kind(EncoderSign, "the encoder counts the other way"),
+    "plant.cpr": Kind(Scale, "the encoder has other counts/rev", {"factor": Number("", 0.01, 100, 4)}),
+    "plant.motor_sign": Kind(MotorSign, "the motor's wires are swapped"),
+    "plant.power": Kind(Power, "the motor has no power"),
+    "plant.gain": Kind(Gain, "the motor has another gain", {"factor": Number("", -10, 10, 0.5)}),
+    "plant.saturation": Kind(Saturation, "the amplifier gives no more than this", _VOLTS),
+    "plant.offset": Kind(Offset, "the amplifier adds a voltage", {"V": Number("V", -100, 100, 1)}),
+    "plant.dead_band": Kind(DeadBand, "the amplifier gives nothing below this", _VOLTS),
+    "plant.shove": Kind(
+        Shove,
+        "somebody pushes the arm",
+        {"rad_s2": Number("rad/s2", 0, 1e5, 100), "way": Choice(("either", "up", "down"))},
+    ),
+}

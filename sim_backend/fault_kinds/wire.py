@@ -1,0 +1,255 @@
+"""Faults of a line: what is sent in one piece arrives changed, late, twice, or not at all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Iterable
+
+    from sim_backend.board import Board
+    from sim_backend.fault_kinds.effect import Setup, Value
+
+Way = Literal["up", "down"]
+"""`up`: from host to device."""
+
+_WAY = Choice(("both", "up", "down"))
+_LATELY = 25  # pieces, the longest burst
+
+
+def _probability(default: float) -> Number:
+    return Number("", 0.0, 1.0, default)
+
+
+class WireEffect(Effect):
+    """A piece in, pieces out; on CAN a piece is a frame, its identifier in front."""
+
+    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
+        super().__init__(setup, luck, **params)
+        self._way = str(params.get("way", "both"))
+
+    def affects(self, way: Way) -> bool:
+        """Whether it has a say in what travels that way now."""
+        return self.on and self._way in ("both", way)
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
+        """Return what arrives at once of a piece."""
+        return (piece,)
+
+    def released(self, way: Way) -> list[bytes]:  # noqa: ARG002
+        """Return what arrives now of earlier pieces; asked once a period, on or off."""
+        return []
+
+
+class Lucky(WireEffect):
+    """Befalls a piece with probability p."""
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
+        """Leave most as they are."""
+        return self.spoil(piece) if self.luck.random() < self.number("p") else (piece,)
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:  # noqa: ARG002
+        """Return what becomes of one."""
+        return ()
+
+
+class Drop(Lucky):
+    """Loses pieces, so many in a row."""
+
+    _left: dict[Way, int]
+
+    def begin(self) -> None:
+        """Start with none to lose."""
+        self._left = {"up": 0, "down": 0}
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
+        """Lose it, or not."""
+        if self._left[way] == 0 and self.luck.random() < self.number("p"):
+            self._left[way] = round(self.number("burst"))
+        if self._left[way]:
+            self._left[way] -= 1
+            return ()
+        return (piece,)
+
+
+class Duplicate(Lucky):
+    """Sends a piece twice."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Double it."""
+        return piece, piece
+
+
+class Flip(Lucky):
+    """Turns bits over, never the delimiter's own: that is losing and inserting."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Turn some over."""
+        changed = bytearray(piece)
+        end = len(piece) - (self.setup.carrier != "can")
+        for place in self.luck.sample(range(8 * end), min(round(self.number("bits")), 8 * end)):
+            changed[place // 8] ^= 1 << place % 8
+        return (bytes(changed),)
+
+
+class Truncate(Lucky):
+    """Loses the last bytes of a piece, its delimiter first: two pieces merge."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Cut it off."""
+        return (piece[: max(0, len(piece) - round(self.number("bytes")))],)
+
+
+class Insert(Lucky):
+    """Puts random bytes somewhere into a piece."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Cut it open."""
+        place = self.luck.randrange(len(piece) + 1)
+        return (piece[:place] + self.luck.randbytes(round(self.number("bytes"))) + piece[place:],)
+
+
+class Garbage(Lucky):
+    """Sends random bytes before a piece."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Put noise first."""
+        return self.luck.randbytes(round(self.number("bytes"))), piece
+
+
+class Garble(Lucky):
+    """Turns a piece into noise of its length, as another bit rate does."""
+
+    def spoil(self, piece: bytes) -> Iterable[bytes]:
+        """Replace it."""
+        return (self.luck.randbytes(len(piece)),)
+
+
+class Timed(WireEffect):
+    """Keeps pieces for later."""
+
+    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
+        super().__init__(setup, luck, **params)
+        self._now = 0
+        self._waiting: dict[Way, list[tuple[int, bytes]]] = {"up": [], "down": []}
+
+    def keep(self, piece: bytes, way: Way, periods: int) -> None:
+        """Let a piece arrive so much later."""
+        self._waiting[way].append((self._now + periods, piece))
+
+    def released(self, way: Way) -> list[bytes]:
+        """Return what is due."""
+        if way == "up":  # asked first in every period
+            self._now += 1
+        waiting = self._waiting[way]
+        if not waiting:
+            return []
+        self._waiting[way] = [item for item in waiting if item[0] > self._now]
+        return [piece for due, piece in waiting if due <= self._now]
+
+
+class Delay(Timed):
+    """Every piece arrives later by the same time."""
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
+        """Keep it."""
+        self.keep(piece, way, self.periods("ms"))
+        return ()
+
+
+class Reorder(Timed):
+    """Keeps a piece back until later ones have overtaken it."""
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
+        """Keep it, or not."""
+        if self.luck.random() >= self.number("p"):
+            return (piece,)
+        self.keep(piece, way, 1 + self.luck.randrange(round(self.number("depth"))))
+        return ()
+
+
+class Hold(Timed):
+    """Stops for a while, then everything comes in one burst."""
+
+    _until = 0
+
+    def begin(self) -> None:
+        """Start to hold."""
+        self._until = self._now + self.periods("ms")
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
+        """Keep it while it lasts."""
+        if self._now >= self._until:
+            return (piece,)
+        self.keep(piece, way, self._until - self._now)
+        return ()
+
+
+class Unplug(Effect):
+    """The line hangs up; with an end it is plugged in again."""
+
+    _board: Board | None = None
+
+    def tick(self, board: Board | None) -> None:
+        """Pull once."""
+        if board is not None and self._board is None:
+            self._board = board
+            board.link(up=False)
+
+    def end(self) -> None:
+        """Plug in again."""
+        if self._board is not None:
+            self._board.link(up=True)
+            self._board = None
+
+
+_BYTES = Number("bytes", 1, 32, 4)
+WIRE = {
+    "wire.drop": Kind(
+        Drop,
+        "pieces are lost, `burst` in a row",
+        {"p": _probability(0.1), "burst": Number("", 1, _LATELY, 1), "way": _WAY},
+        wired=True,
+    ),
+    "wire.dup": Kind(Duplicate, "pieces come twice", {"p": _probability(0.2), "way": _WAY}, wired=True),
+    "wire.delay": Kind(Delay, "pieces come late", {"ms": Number("ms", 1, 500, 5), "way": _WAY}, wired=True),
+    "wire.reorder": Kind(
+        Reorder,
+        "pieces overtake one another",
+        {"p": _probability(0.1), "depth": Number("", 1, 100, 3), "way": _WAY},
+        wired=True,
+    ),
+    "wire.flip": Kind(
+        Flip,
+        "bits are turned over",
+        {"p": _probability(0.02), "bits": Number("bits", 1, 3, 1), "way": _WAY},
+        wired=True,
+    ),
+    "wire.truncate": Kind(
+        Truncate,
+        "the end of a piece is lost",
+        {"p": _probability(0.02), "bytes": _BYTES, "way": _WAY},
+        wired=True,
+    ),
+    "wire.insert": Kind(
+        Insert,
+        "bytes appear inside a piece",
+        {"p": _probability(0.02), "bytes": _BYTES, "way": _WAY},
+        wired=True,
+    ),
+    "wire.garbage": Kind(
+        Garbage,
+        "noise between pieces",
+        {"p": _probability(0.02), "bytes": _BYTES, "way": _WAY},
+        wired=True,
+    ),
+    "wire.garble": Kind(Garble, "noise instead of pieces", {"p": _probability(1.0), "way": _WAY}, wired=True),
+    "wire.hold": Kind(
+        Hold, "silence, then a burst", {"ms": Number("ms", 1, 2000, 200), "way": _WAY}, wired=True
+    ),
+    "wire.blackhole": Kind(Lucky, "nothing arrives", {"p": _probability(1.0), "way": _WAY}, wired=True),
+    "wire.unplug": Kind(Unplug, "the line hangs up", wired=True),
+}
