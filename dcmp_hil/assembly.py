@@ -51,7 +51,7 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,
-        Aligner(trajectory.at, rig.delay),
+        Aligner(trajectory.at, rig.delay, lambda: trajectory.began),
         sinks,
         recent=max(1, round(rig.loop.rate_hz)),
         in_line=in_line,

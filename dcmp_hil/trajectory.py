@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,11 @@ class Trajectory:
         self._x0 = 0.0
         self._begun = False
         self._way_down: _WayDown | None = None
+
+    @property
+    def began(self) -> float:
+        """Device time at which the trajectory began, s; infinity before it did."""
+        return self._t0 if self._begun else math.inf
 
     def hold(self, position: float) -> None:
         """Stay at `position` (rad) until the trajectory begins."""

@@ -16,7 +16,7 @@ from dcmp_hil.errors import ConfigError, LinkError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.values import Estimate, Reference, Sample
 from sim_backend.backend import SimBackend
-from tests.helpers import STEADY, HeldRun, T, bench, named
+from tests.helpers import STEADY, HeldRun, T, bench, known, named
 
 if TYPE_CHECKING:
     from typing import Self
@@ -469,3 +469,11 @@ def test_reference_is_where_the_arm_is_when_it_settles() -> None:
     columns = run(load_rig("bench-1khz", ["sim.position_rad=0.1"]), duration=0.2, fast=True).columns
     assert columns["position_reference_rad"] == pytest.approx(columns["position_reference_rad"][0])
     assert columns["position_reference_rad"][0] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_probe_is_no_tracking_error() -> None:
+    result = run(bench(), duration=1.5, fast=True)
+    t, error = result.columns["time_s"], result.columns["tracking_error_mrad"]
+    assert np.isnan(error[t < 0.545]).all()
+    assert not np.isnan(error[t > 0.555]).any()
+    assert known(result.summary.tracking_max_rad) < 0.02

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,11 +30,16 @@ class Block:
         Shape (n, len(FIELDS)), as `Ring.drain` gives them.
     reference
         Shape (n, 3): position rad, velocity rad/s and acceleration rad/s2 at each row's own `t`.
+    began
+        s, device time at which the trajectory began.
     """
 
-    def __init__(self, rows: NDArray[np.float64], reference: NDArray[np.float64]) -> None:
+    def __init__(
+        self, rows: NDArray[np.float64], reference: NDArray[np.float64], began: float = -math.inf
+    ) -> None:
         self.rows = rows
         self.reference = reference
+        self._began = began
 
     def __len__(self) -> int:
         """Count the periods."""
@@ -46,10 +52,14 @@ class Block:
 
     @property
     def tracking_error(self) -> NDArray[np.float64]:
-        """Position minus reference at the same instant, rad: the true position where it is known."""
+        """Position minus reference at the same instant, rad: the true position where it is known.
+
+        NaN before the trajectory began: the probe moves the arm, and there is nothing to track.
+        """
         true = self["position_true"]
         position = np.where(np.isnan(true), self["position"], true)
         error: NDArray[np.float64] = position - self.reference[:, 0]
+        error[self["t"] < self._began] = np.nan
         return error
 
 
@@ -65,10 +75,18 @@ class Aligner:
         The trajectory.
     delay
         s, from a sample to the instant at which its command takes effect.
+    began
+        When the trajectory began, s; infinity before it did.
     """
 
-    def __init__(self, at: Callable[[float], Reference], delay: float) -> None:
+    def __init__(
+        self,
+        at: Callable[[float], Reference],
+        delay: float,
+        began: Callable[[], float] = lambda: -math.inf,
+    ) -> None:
         self._at = at
+        self._began = began
         self._delay = delay
         self._last = np.full((1, len(FIELDS)), np.nan)
 
@@ -78,7 +96,7 @@ class Aligner:
         The delay is 0 or one period, so the row before, or the row itself, is the one wanted.
         """
         if self._delay == 0.0:
-            return Block(rows, rows[:, _AHEAD])
+            return Block(rows, rows[:, _AHEAD], self._began())
         earlier = np.concatenate((self._last, rows[:-1]))
         reference = earlier[:, _AHEAD]
         missed = ~(np.abs(earlier[:, _T] + self._delay - rows[:, _T]) < 0.02 * self._delay)
@@ -86,4 +104,4 @@ class Aligner:
             reference[k] = self._at(float(rows[k, _T]))
         if len(rows):
             self._last = rows[-1:].copy()
-        return Block(rows, reference)
+        return Block(rows, reference, self._began())
