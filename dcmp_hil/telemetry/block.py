@@ -59,7 +59,7 @@ class Block:
         true = self["position_true"]
         position = np.where(np.isnan(true), self["position"], true)
         error: NDArray[np.float64] = position - self.reference[:, 0]
-        error[self["t"] < self._began] = np.nan
+        error[self["t"] <= self._began] = np.nan  # in that period the reference is still the one before
         return error
 
 
