@@ -78,6 +78,6 @@ class TripError(DcmpError):
 
 
 class DeadlineError(DcmpError):
-    """A deadline was missed under strict timing."""
+    """Deadlines were missed under `timing.overrun = "stop"`, or cannot be promised under "enforce"."""
 
     exit_code = 5

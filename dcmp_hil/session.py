@@ -123,7 +123,7 @@ class Session:
         TripError
             With the last second of cycles.
         DeadlineError
-            If real time is enforced and was not to be had.
+            If `timing` enforces real time that is not granted, or ends a run that is late too often.
         BackendError
             If the device or the way to it fails.
         """
@@ -214,6 +214,8 @@ def run(
         If an argument does not fit the rig.
     TripError
         If the supervisor stopped the run; `.cycles` holds the last second.
+    DeadlineError
+        If `timing` enforces real time that is not granted, or ends a run that is late too often.
     BackendError
         If the device or the way to it fails.
     """
