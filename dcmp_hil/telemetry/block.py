@@ -59,7 +59,7 @@ class Block:
         true = self["position_true"]
         position = np.where(np.isnan(true), self["position"], true)
         error: NDArray[np.float64] = position - self.reference[:, 0]
-        error[self["t"] <= self._began] = np.nan  # in that period the reference is still the one before
+        error[self["t"] < self._began] = np.nan
         return error
 
 
@@ -95,13 +95,15 @@ class Aligner:
 
         The delay is 0 or one period, so the row before, or the row itself, is the one wanted.
         """
+        began = self._began()
         if self._delay == 0.0:
-            return Block(rows, rows[:, _AHEAD], self._began())
+            return Block(rows, rows[:, _AHEAD], began)
         earlier = np.concatenate((self._last, rows[:-1]))
         reference = earlier[:, _AHEAD]
         missed = ~(np.abs(earlier[:, _T] + self._delay - rows[:, _T]) < 0.02 * self._delay)
+        missed |= (earlier[:, _T] < began) & (rows[:, _T] >= began)  # there it jumps to where the arm is
         for k in np.flatnonzero(missed):
             reference[k] = self._at(float(rows[k, _T]))
         if len(rows):
             self._last = rows[-1:].copy()
-        return Block(rows, reference, self._began())
+        return Block(rows, reference, began)
