@@ -15,7 +15,7 @@ from dcmp_hil.backends.failures import reason
 from dcmp_hil.backends.serial_link import path_of
 from dcmp_hil.backends.slcan_bus import SlcanBus
 from dcmp_hil.config.backends import Can as CanSettings
-from dcmp_hil.errors import ConfigError, LinkError, OpenError
+from dcmp_hil.errors import ConfigError, DcmpError, LinkError, OpenError
 from dcmp_hil.wire.frame import Frame
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ FAILURES = (
     TypeError,
     AttributeError,
 )
-"""What interfaces of python-can raise when they fail; TypeError and AttributeError come from closed "
-"ports."""
+"""What interfaces of python-can raise when they fail; the last two come from ports that are closed."""
 
 _NETWORKED = ("socketcand", "udp_multicast")
+_WAITING = ("robotell", "seeedstudio", "serial")  # they write without a bound: a frozen device would hold us
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
 _LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
 
@@ -174,6 +174,11 @@ def _open_bus(settings: CanSettings) -> can.BusABC:
             f'backend.interface: "{interface}" reaches over the network; a motor is driven from the machine '
             "that it is plugged into."
         )
+    if interface in _WAITING:
+        raise ConfigError(
+            f'backend.interface: python-can\'s "{interface}" may wait for ever in a write. On a serial line '
+            'use interface = "slcan", or backend.kind = "serial".'
+        )
     if interface != "virtual" and interface not in can.VALID_INTERFACES:
         raise ConfigError(
             f'backend.interface: python-can has no "{interface}". It has: '
@@ -186,22 +191,28 @@ def _open_bus(settings: CanSettings) -> can.BusABC:
         return can.Bus(
             channel=channel, interface=interface, bitrate=settings.bitrate, ignore_config=True, **options
         )
-    except FAILURES as error:
-        raise _cannot_open(settings, error) from error
     except (ImportError, can.CanInterfaceNotImplementedError) as error:
         raise OpenError(
             f"{interface}: its driver is missing: {error}. See python-can's page of it."
         ) from error
+    except DcmpError:
+        raise
+    except Exception as error:
+        raise _cannot_open(settings, error) from error  # drivers raise whatever they like
 
 
 def _cannot_open(settings: CanSettings, error: BaseException) -> OpenError:
     cause = error
     while cause.__cause__ is not None:
         cause = cause.__cause__
+    hint = (
+        f"the interface is up: ip link set {settings.channel} up type can bitrate {settings.bitrate}."
+        if settings.interface == "socketcan"
+        else "its driver is installed."
+    )
     return OpenError(
         f"{settings.interface} {settings.channel}: cannot be opened: {cause}. Check backend.channel and that "
-        f"the interface is up; for socketcan: ip link set {settings.channel} up type can bitrate "
-        f"{settings.bitrate}."
+        f"{hint}"
     )
 
 

@@ -168,6 +168,22 @@ def test_can_channel_that_is_not_there(cli: Cli) -> None:
     assert "ip link" in only_line(outcome)
 
 
+@pytest.mark.parametrize("interface", ["serial", "robotell", "seeedstudio"])
+def test_interface_that_may_wait_for_ever_is_refused(cli: Cli, interface: str) -> None:
+    overrides = ("--set", f"backend.interface={interface}", "--set", "backend.channel=/dev/null")
+    outcome = cli("run", "bench-can", *overrides, "--no-record", "--viewer", "none")
+    assert outcome.code == 2
+    assert "slcan" in only_line(outcome)
+
+
+@pytest.mark.parametrize("interface", ["kvaser", "pcan", "vector", "gs_usb", "ixxat"])
+def test_interface_without_its_driver_is_one_line(cli: Cli, interface: str) -> None:
+    overrides = ("--set", f"backend.interface={interface}", "--set", 'backend.channel="0"')
+    outcome = cli("run", "bench-can", *overrides, "--no-record", "--viewer", "none")
+    assert outcome.code == 3
+    assert "ip link" not in only_line(outcome)
+
+
 def test_networked_interface_is_refused(cli: Cli) -> None:
     outcome = cli(
         "run", "bench-can", "--set", "backend.interface=udp_multicast", "--no-record", "--viewer", "none"
