@@ -57,6 +57,18 @@ void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_
     settable(parameters, DCMP_SPEED_LIMIT_COUNTS_S, 1, config->speed_limit_counts_s);
     settable(parameters, DCMP_TRAVEL_LIMIT_COUNTS, 1, config->travel_limit_counts);
     settable(parameters, DCMP_EDGE_STAMPS, 0, config->edge_stamps ? 1 : 0);
+    for (uint32_t id = 0; id < DCMP_PARAMETER_SLOTS; id++) {
+        parameters->built[id] = parameters->value[id];
+    }
+}
+
+void dcmp_parameters_restore(struct dcmp_parameters *parameters)
+{
+    for (uint32_t id = 0; id < DCMP_PARAMETER_SLOTS; id++) {
+        if (parameters->range[id].lowest <= parameters->range[id].highest) {
+            parameters->value[id] = parameters->built[id];
+        }
+    }
 }
 
 bool dcmp_parameters_known(uint8_t id)

@@ -19,6 +19,7 @@ struct dcmp_range {
 
 struct dcmp_parameters {
     int32_t value[DCMP_PARAMETER_SLOTS];
+    int32_t built[DCMP_PARAMETER_SLOTS]; /* what the board was built with */
     struct dcmp_range range[DCMP_PARAMETER_SLOTS];
 };
 
@@ -26,6 +27,9 @@ struct dcmp_parameters {
 bool dcmp_config_valid(const struct dcmp_config *config);
 
 void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_config *config);
+
+/* Forget what a host changed: the next one finds the board as it was built. */
+void dcmp_parameters_restore(struct dcmp_parameters *parameters);
 
 /* 0 for one that does not exist. */
 int32_t dcmp_parameters_get(const struct dcmp_parameters *parameters, uint8_t id);

@@ -61,6 +61,7 @@ static void receive_hello(struct dcmp_device *device, const struct dcmp_frame *f
     if (!identity.mismatch) {
         if (dcmp_session_ask(session, hello.session, now_us)) {
             device->supervisor.lowered = false; /* a fault is left by an edge of one session */
+            dcmp_parameters_restore(&device->parameters);
         } else if (dcmp_session_owns(session, hello.session)) {
             dcmp_session_renew(session, now_us);
         }

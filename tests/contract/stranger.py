@@ -191,6 +191,7 @@ class Stranger:
         if session and theirs == HASH and self._owner in {0, session}:
             if self._owner == 0:
                 self._begin_session(session)
+                self._parameters.restore()
             self._heard_us = self.now_us
         owned = session != 0 and self._owner == session
         flags = (self._owner != 0 and not owned) + 2 * owned + 4 * (theirs != HASH)

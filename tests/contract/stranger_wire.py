@@ -252,12 +252,17 @@ class Parameters:
     """The values of section 9."""
 
     def __init__(self, limits: dict[int, int], facts: dict[int, int]) -> None:
-        self.now = {BOARD: 1, BOOT_COUNT: 0, RESET_CAUSE: 0, TICK: 0, EDGE_STAMPS: 0} | limits | facts
+        self._built = limits | {EDGE_STAMPS: 0}
+        self.now = {BOARD: 1, BOOT_COUNT: 0, RESET_CAUSE: 0, TICK: 0} | self._built | facts
         self._highest = limits | {
             SLEW: limits[SLEW] or LARGEST,
             WATCHDOG: 50,
             EDGE_STAMPS: 0,
         }  # no stamps here
+
+    def restore(self) -> None:
+        """Forget what a host changed."""
+        self.now.update(self._built)
 
     def told(self, id_: int, result: int) -> bytes:
         """Return what PARAMETER_VALUE says now."""

@@ -267,6 +267,22 @@ def test_parameters(host: Callable[..., Host]) -> None:
     assert h.put(wire.SLEW, 1, THEIRS) == (wire.NOT_IDLE, 70_000)
 
 
+@pytest.mark.parametrize("session", [OURS, THEIRS])
+def test_the_next_host_finds_the_device_as_it_was_built(ready: Host, session: int) -> None:
+    assert ready.put(wire.VOLTAGE_LIMIT, 2000) == (wire.OK, 2000)
+    assert ready.put(wire.SLEW, 5) == (wire.OK, 5)
+    assert ready.put(wire.WATCHDOG, 50) == (wire.OK, 50)
+    assert ready.hello() == "o"  # the owner again: nothing changes
+    assert ready.get(wire.VOLTAGE_LIMIT) == (wire.OK, 2000)
+    ready.drive(release=1)
+    assert ready.get(wire.SLEW) == (wire.OK, 5)  # nobody is there whom it could disturb
+    assert ready.hello(session) == "o"
+    assert ready.get(wire.VOLTAGE_LIMIT) == (wire.OK, 10_000)
+    assert ready.get(wire.SLEW) == (wire.OK, 0)
+    assert ready.get(wire.WATCHDOG) == (wire.OK, 20)
+    assert ready.get(wire.TICK)[1] == ready.ticks
+
+
 def test_ten_drives_arm_the_device(ready: Host) -> None:
     for _ in range(9):
         ready.drive(arm=1)
