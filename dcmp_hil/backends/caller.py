@@ -73,6 +73,12 @@ class Caller:
             return None
         return None if message is None else (node, message)
 
+    def listen(self, seconds: float) -> None:
+        """Hear whatever comes for so long."""
+        deadline_ns = self._clock.now_ns() + int(1e9 * seconds)
+        while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
+            self.hear(1e-9 * left_ns)
+
     def hear_sample(self, timeout: float) -> SampleReport | None:
         """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
         sample = self._until(timeout, SampleReport, lambda _: True)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backends.terms import Terms
     from dcmp_hil.clock import Clock
 
+_HELLOS, _TOLD = 5, 2
 _ROUND_TRIPS = 5
 _SLOWEST = 3e-3  # s: a command older than that is refused by the device
 
@@ -106,16 +107,23 @@ class Handshake:
         raise refusals.silence(self._link.name, PATIENCE)
 
     def _introduce(self) -> str:
-        identity = self._caller.ask(Hello(self._session, PROTOCOL_HASH), Identity)
-        name = self._link.name
-        if identity is None:
-            raise refusals.deaf(name)
-        firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
-        if identity.mismatch or identity.protocol_hash != PROTOCOL_HASH:
-            raise refusals.other_protocol(name, firmware, identity.protocol_hash)
-        if identity.busy or not identity.owned:
-            raise refusals.owned(name)
-        return firmware
+        """Become the owner, and be told so twice: on a bus an IDENTITY may be the answer to somebody else."""
+        told = 0
+        for _ in range(_HELLOS):
+            identity = self._caller.ask(Hello(self._session, PROTOCOL_HASH), Identity)
+            if identity is None:
+                raise refusals.deaf(self._link.name)
+            firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
+            if identity.mismatch or identity.protocol_hash != PROTOCOL_HASH:
+                raise refusals.other_protocol(self._link.name, firmware, identity.protocol_hash)
+            if identity.owned and not identity.busy:
+                told += 1
+            else:
+                told = 0
+                self._caller.listen(1e-3 * (5 + secrets.randbelow(20)))
+            if told == _TOLD:
+                return firmware
+        raise refusals.owned(self._link.name)
 
     def _compare(self) -> None:
         """Hold the rig against the device; every difference at once."""

@@ -16,7 +16,7 @@ from dcmp_hil.errors import ConfigError, LinkError, OpenError, SampleTimeoutErro
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import protocol_hash
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.messages import State, Stop
+from dcmp_hil.wire.messages import Hello, State, Stop
 from sim_backend.sim_board import SimBoardBackend
 from tests.contract.benches import ALL, IN_PROCESS, PUMPED, WIRED, on_bench
 from tests.contract.hooks import Doubler, Dropper, Flipper, Swapper, on_way_down
@@ -417,4 +417,24 @@ def test_ctrl_c_while_arming_leaves_nothing_armed(kind: str, monkeypatch: pytest
         monkeypatch.setattr(bench.board, "tick", interrupted)
         with pytest.raises(KeyboardInterrupt):
             bench.make().__enter__()
+        assert at_rest(bench)
+
+
+@pytest.mark.parametrize("kind", ["sim-board can", "stranger can"])
+def test_an_identity_that_answers_somebody_else_is_not_believed(kind: str) -> None:
+    """Another host's HELLO comes just before ours: its IDENTITY says owned, and means the other one."""
+    with on_bench(kind) as bench:
+        receive = bench.board.receive_frame
+        meddled: list[int] = []
+
+        def meddle(number: int, data: bytes) -> None:
+            if number == 0x060 and not meddled:
+                meddled.append(number)
+                receive(*pack(Hello(0x4242, protocol_hash.PROTOCOL_HASH)))
+            receive(number, data)
+
+        bench.board.receive_frame = meddle  # type: ignore[method-assign]
+        with pytest.raises(OpenError, match="another host"):
+            bench.make().__enter__()
+        assert meddled
         assert at_rest(bench)
