@@ -25,6 +25,11 @@ class StopRequest:
         self._before: dict[signal.Signals, object] = {}
         self._entered = 0
 
+    @property
+    def exit_code(self) -> int:
+        """0 if nobody asked, or Ctrl-C did; 128 + n for signal n."""
+        return 0 if self.signal in (None, signal.SIGINT) else 128 + self.signal
+
     def __enter__(self) -> Self:
         """Install the handlers; entering again changes nothing."""
         self._entered += 1

@@ -69,7 +69,10 @@ def _built(board: str, name: str, flags: tuple[str, ...]) -> Path:
 
 
 def _compiler() -> list[str]:
-    asked = shlex.split(os.environ.get("CC", ""))
+    try:
+        asked = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise OpenError(f"CC={os.environ['CC']}: {error}. Set CC to the name of a C compiler.") from error
     if asked:
         return asked
     found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)

@@ -10,7 +10,7 @@ from dcmp_hil.backends.caller import Caller
 from dcmp_hil.backends.links import make_link
 from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.errors import DcmpError
-from dcmp_hil.values import Fault
+from dcmp_hil.faults import name_of
 from dcmp_hil.wire.messages import Hello, Identity, SampleReport, State
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
 
 _LISTEN = 0.25  # s; a device sends every period, from boot on
+_OTHER = 7  # fault class of every code from 7 on
 _ASKS_ONLY = 0  # the session of a HELLO that owns nothing
 _DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
 
@@ -164,4 +165,4 @@ def state_in_words(sample: SampleReport) -> str:
     state = State(sample.state).name if sample.state in set(State) else f"state {sample.state}"
     if sample.state != State.FAULT:
         return state
-    return f"{state} ({Fault(sample.fault_class).name})"
+    return f"{state} ({name_of(sample.fault_class) if sample.fault_class < _OTHER else 'see FAULT'})"

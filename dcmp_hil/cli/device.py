@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import signal
 from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -67,7 +66,7 @@ def device(
         keys = [key.format(port=port) for key in _RUN_WITH[link]]
         console.note(shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
         _keep_running(running, loaded, stop)
-    raise typer.Exit(0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal)
+    raise typer.Exit(stop.exit_code)
 
 
 def _run_command(rig: str, overrides: list[str]) -> list[str]:

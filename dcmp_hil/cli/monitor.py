@@ -24,4 +24,4 @@ def monitor(
     from dcmp_hil.cli.monitoring import watch
     from dcmp_hil.config import load_rig
 
-    watch(load_rig(rig, overrides or ()), duration, all_frames=all_frames)
+    raise typer.Exit(watch(load_rig(rig, overrides or ()), duration, all_frames=all_frames))

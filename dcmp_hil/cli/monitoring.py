@@ -40,8 +40,8 @@ class _Brief:
         return True
 
 
-def watch(rig: Rig, duration: float, *, all_frames: bool) -> None:
-    """Print messages until `duration` (s, 0 for ever) is over or somebody asks for the end."""
+def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
+    """Print messages for `duration` (s, 0 for ever) or until somebody ends it; return the exit code."""
     clock = MonotonicClock()
     link = make_link(rig.backend, clock)
     link.open()
@@ -60,9 +60,10 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> None:
                 if all_frames or brief.lets_through(*found, now_ns):
                     _show(1e-9 * (now_ns - began_ns), *found)
     finally:
+        damaged = link.corrupt + caller.corrupt
         link.close()
-    damaged = link.corrupt + caller.corrupt
     console.note(f"{heard} messages, {damaged} damaged frames")
+    return stop.exit_code
 
 
 def _show(t: float, node: int, message: Message) -> None:

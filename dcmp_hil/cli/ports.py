@@ -14,8 +14,12 @@ def ports(
         list[str] | None,
         typer.Argument(metavar="[PORT]...", help="Serial ports to look at besides, such as /dev/pts/3."),
     ] = None,
-    baud: Annotated[int, typer.Option(metavar="BIT_S", help="Of serial ports.")] = 1_000_000,
-    bitrate: Annotated[int, typer.Option(metavar="BIT_S", help="Of CAN buses.")] = 1_000_000,
+    baud: Annotated[
+        int, typer.Option(metavar="BIT_S", min=9600, max=12_000_000, help="Of serial ports.")
+    ] = 1_000_000,
+    bitrate: Annotated[
+        int, typer.Option(metavar="BIT_S", min=10_000, max=1_000_000, help="Of CAN buses.")
+    ] = 1_000_000,
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 

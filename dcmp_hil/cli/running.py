@@ -82,7 +82,7 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
         raise
     finally:
         _conclude(session, options, folder, ended_by, trip)
-    return 0 if stop.signal in (None, signal.SIGINT) else 128 + stop.signal
+    return stop.exit_code
 
 
 def _sinks(rig: Rig, options: Options, folder: RunFolder | None) -> list[Sink]:
