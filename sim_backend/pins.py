@@ -31,6 +31,7 @@ class Pins:
     def __init__(self, rig: Rig, count_offset: int = 0) -> None:
         self._plant = make_plant(rig)
         self._encoder = make_encoder(rig)
+        self._healthy = self._plant, self._encoder
         self._stage = _power_stage(rig)
         self._mV_per_V = rig.amplifier.sign * 1e3
         self._encoder_sign = rig.encoder.sign
@@ -46,8 +47,9 @@ class Pins:
         self.truth = self._plant.advance(voltage)
 
     def befall(self, faults: Injection) -> None:
-        """Let faults come between the pins and the plant."""
-        self._plant, self._encoder = faults.plant(self._plant), faults.encoder(self._encoder)
+        """Let faults come between the pins and the plant, instead of earlier ones."""
+        plant, encoder = self._healthy
+        self._plant, self._encoder = faults.plant(plant), faults.encoder(encoder)
 
     def count(self) -> int:
         """Return what the encoder's counter shows, 32 bits."""

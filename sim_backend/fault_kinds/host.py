@@ -83,7 +83,7 @@ class Raise(HostEffect):
 
     def _raise(self) -> None:
         kinds = {"exception": InjectedError, "base": InjectedBaseError}
-        raise kinds[self.word("what")](f"injected: {self.word('in')}")
+        raise kinds[self.word("what")](f"injected: {self.word('where')}")
 
 
 class Diverge(HostEffect):

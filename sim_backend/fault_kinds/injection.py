@@ -115,6 +115,7 @@ class Injection:
         self._boot: Start | None = None
         self._tick = 0
         self._open = False
+        self._first_began: int | None = None
         self._truth: Callable[[], Truth]
         for place, fault in enumerate(faults):
             luck = random.Random(f"{seed} {place} {fault.kind}")  # noqa: S311 - it must repeat itself
@@ -185,11 +186,18 @@ class Injection:
         moment = Moment(tick, tick * self._setup.period, self._truth())
         for timer in self.timers:
             timer.look(moment)
+        if self._first_began is None and self.board and any(timer.effect.on for timer in self.timers):
+            self._first_began = self.board.tick_count
 
     @property
     def now(self) -> int:
-        """Periods since the backend was opened."""
+        """Periods since the first sample."""
         return self._tick
+
+    @property
+    def first_began(self) -> int | None:
+        """Ticks of the board, from its making, when the first fault began; None if none has, or no board."""
+        return self._first_began
 
     def passed(self, piece: bytes, way: Way) -> list[bytes]:
         """Return what arrives at once of a piece."""

@@ -1,0 +1,187 @@
+"""Plans: text, bounds, times, luck, and where they may be used."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dcmp_hil import run
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.session import Session
+from sim_backend.fault_kinds.effect import Number
+from sim_backend.fault_kinds.text import WrongFaultError
+from sim_backend.faults import KINDS, Fault, FaultPlan, with_faults
+from tests.faults.matrix import judge, outcome_of
+from tests.faults.rows import ROWS, SILENT, Row
+from tests.helpers import bench
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+    from dcmp_hil.session import Result
+    from sim_backend.fault_kinds.injection import Moment
+
+BOARD = "backend.kind=sim-board"
+QUICK = "supervisor.start=immediate"
+
+
+@pytest.fixture(autouse=True)
+def same_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every host choose the same session."""
+    monkeypatch.setattr(secrets, "randbelow", lambda below: below // 2)
+
+
+def on(rig: Rig, *texts: str, seed: int = 1) -> Rig:
+    return FaultPlan([Fault.of(text) for text in texts], seed).on(rig)
+
+
+def quick(*faults: Fault, backend: str = BOARD, duration: float = 0.2, seed: int = 1) -> Result:
+    return run(FaultPlan(faults, seed).on(bench(backend, QUICK)), duration=duration, fast=True)
+
+
+def lost_at(result: Result) -> list[int]:
+    """Return the ticks whose samples never came."""
+    ticks = np.round(1e3 * result.columns["time_s"]).astype(int)
+    return sorted(set(range(ticks[0], ticks[-1])) - set(ticks.tolist()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_can_be_made_with_its_defaults_and_is_in_the_matrix(kind: str) -> None:
+    assert Fault.of(kind).params.keys() == KINDS[kind].params.keys()
+    assert any(row.fault.partition(":")[0] == kind for row in ROWS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_number_has_bounds_around_its_default(kind: str) -> None:
+    for name, param in KINDS[kind].params.items():
+        if isinstance(param, Number):
+            assert param.low <= param.default <= param.high
+            for beyond in (math.nextafter(param.high, math.inf) * 2 + 1, math.nan):
+                with pytest.raises(WrongFaultError, match=name):
+                    Fault(kind, **{name: beyond})
+
+
+def test_text_says_what_the_constructor_says() -> None:
+    read = Fault.of("wire.drop: p=20%, burst=5, at=3s, for=200ms, way=up")
+    made = Fault("wire.drop", at=3.0, for_=0.2, p=0.2, burst=5, way="up")
+    assert (read.kind, read.at, read.params) == (made.kind, made.at, made.params)
+    assert read.for_ == pytest.approx(made.for_)
+    assert Fault.of("wire.hold:ms=0.2s").params["ms"] == 200.0
+    assert Fault.of("plant.shove:rad_s2=1e2rad/s2").params["rad_s2"] == 100.0
+    assert Fault.of("wire.garble:at=boot").at == "boot"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("wire.drp", 'Did you mean "wire.drop"?'),
+        ("xyzzy", "Known: wire.drop"),
+        ("wire.drop:q=1", '"q" is no parameter. Known: p, burst'),
+        ("wire.drop:burts=1", 'Did you mean "burst"?'),
+        ("wire.drop:p=2", "a number from 0 to 1"),
+        ("wire.drop:p=nan", "a number from 0 to 1"),
+        ("wire.drop:p", "a number from 0 to 1"),
+        ("wire.drop:p=0.1V", "a number from 0 to 1"),
+        ("wire.drop:way=left", "both or up or down"),
+        ("wire.delay:ms=3V", "a number from 1 to 500 ms"),
+        ("wire.drop:at=soon", "a time such as 3s"),
+        ("wire.drop:at=-1", "a time such as 3s"),
+        ("wire.drop:for=boot", "a time such as 3s"),
+    ],
+)
+def test_wrong_text_is_refused_with_a_remedy(text: str, says: str) -> None:
+    with pytest.raises(ConfigError, match=r"^--fault") as caught:
+        with_faults(bench(BOARD), [text])
+    assert says in str(caught.value)
+
+
+def test_every_wrong_fault_is_named_at_once() -> None:
+    with pytest.raises(ConfigError) as caught:
+        with_faults(bench(BOARD), ["wire.drp", "wire.drop:q=1,p=2", "plant.power"])
+    assert len(caught.value.faults) == 3
+
+
+def test_faults_are_refused_where_they_cannot_happen() -> None:
+    with pytest.raises(ConfigError, match="has no wire") as caught:
+        with_faults(bench(), ["wire.drop", "firmware.reset", "plant.power"])
+    assert len(caught.value.faults) == 2
+    real = bench("backend.kind=serial", "backend.port=/dev/ttyACM0")
+    with pytest.raises(ConfigError, match="faults are for simulated rigs"):
+        with_faults(real, ["plant.power"])
+    own = bench("controller.kind=tests.helpers:known")
+    with pytest.raises(ConfigError, match="expected a shipped one"):
+        with_faults(own, ["host.raise"])
+
+
+def test_a_rig_with_faults_is_written_like_the_rig_without() -> None:
+    rig = bench(BOARD)
+    assert on(rig, "wire.drop", "host.raise").model_dump(mode="json") == rig.model_dump(mode="json")
+
+
+def test_times_are_ticks_or_seconds_or_a_predicate() -> None:
+    def at_fifty(moment: Moment) -> bool:
+        return moment.tick >= 50 and moment.truth.position < 1.0
+
+    for at in (50, 0.05, at_fifty):
+        found = lost_at(quick(Fault("wire.drop", at=at, for_=4, p=1, way="down")))
+        assert found == [50, 51, 52, 53], at
+
+
+@pytest.mark.parametrize("text", ["wire.drop:p=0.2", "wire.flip:p=0.2,way=down", "wire.reorder:p=0.3"])
+def test_a_seed_repeats_itself_to_the_bit_and_another_does_not(text: str) -> None:
+    def lost(seed: int) -> list[int]:
+        return lost_at(quick(Fault.of(text), seed=seed, duration=0.3))
+
+    assert lost(3) == lost(3) != lost(4)
+
+
+def test_one_fault_more_leaves_the_luck_of_the_others_alone() -> None:
+    drop = Fault("wire.drop", p=0.1, way="down")
+    assert lost_at(quick(drop)) == lost_at(quick(drop, Fault("plant.enc_noise")))
+
+
+def test_a_whole_verdict_repeats_itself() -> None:
+    row = Row("wire.flip:p=0.1,bits=3", settled_mrad=None)
+    assert str(judge(row, 5)) == str(judge(row, 5))
+
+
+def test_a_plan_can_be_used_again() -> None:
+    plan = FaultPlan([Fault("wire.drop", p=0.2, way="down")])
+    first, second = (run(plan.on(bench(BOARD, QUICK)), duration=0.2, fast=True) for _ in range(2))
+    assert lost_at(first) == lost_at(second) != []
+
+
+@pytest.mark.parametrize("carrier", ["cobs", "slcan", "can"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.startswith("wire.")])
+def test_wire_faults_do_something_on_every_carrier(carrier: str, kind: str) -> None:
+    if (kind, carrier) == ("wire.garbage", "can"):
+        pytest.skip("what is between the frames of a CAN bus is its controller's business")
+    rig = bench(BOARD, QUICK, f"backend.carrier={carrier}")
+    healthy = run(rig, duration=0.2, fast=True)
+    likely = {"p": 0.3} if "p" in KINDS[kind].params else {}
+    faulty = FaultPlan([Fault(kind, at=50, for_=50, **likely)]).on(rig)
+    session = Session(faulty, duration=0.2, fast=True)
+    outcome = outcome_of(session)
+    assert outcome in {"completed", *SILENT, "CORRUPT_LINK", "LINK_DOWN"}
+    result = session.result()
+    applied, usual = (each.columns["voltage_applied_V"] for each in (result, healthy))
+    same = outcome == "completed" and result.link == healthy.link and np.array_equal(applied, usual)
+    assert not same
+
+
+def test_every_healthy_run_is_the_same_with_an_empty_plan() -> None:
+    plain = run(bench(BOARD), duration=1.0, fast=True)
+    planned = run(FaultPlan().on(bench(BOARD)), duration=1.0, fast=True)
+    for name, column in plain.columns.items():
+        np.testing.assert_array_equal(column, planned.columns[name], err_msg=name)
+
+
+def test_truth_counts_a_push_as_disturbance() -> None:
+    pushed = quick(Fault("plant.shove", rad_s2=30, way="up", at=50, for_=100), backend="backend.kind=sim")
+    still = quick(backend="backend.kind=sim")
+    at = slice(60, 140)
+    gone = pushed.columns["disturbance_true_rad_s2"][at] - still.columns["disturbance_true_rad_s2"][at]
+    assert np.mean(gone) == pytest.approx(30.0, abs=3.0)
