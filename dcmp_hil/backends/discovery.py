@@ -50,7 +50,8 @@ class Finding:
 def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) -> Iterator[Finding]:
     """Look at every serial port and CAN channel, and at ports named besides.
 
-    It listens first and asks only where a device of ours is heard: other people's equipment is left alone.
+    It asks only where a device of ours is heard; before that it sends only what opens a line (one 0x00, and
+    the slcan commands C, S8, O).
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ def monitor(
         bool, typer.Option("--all", help="Every SAMPLE and DRIVE, not ten a second.")
     ] = False,
 ) -> None:
-    """Print what travels on a link, decoded, without taking part: no session, nothing is sent.
+    """Print what travels on a link, decoded, without taking part: no session, no message is sent.
 
     A serial port has one reader: while a run has it, this says so and ends.
     """

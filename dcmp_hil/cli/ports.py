@@ -23,7 +23,8 @@ def ports(
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
-    It listens first and asks only where a device of this project is heard.
+    It asks only where a device of this project is heard. Before that it sends what opens a line: one byte
+    0x00, and the slcan commands C, S8, O.
     """
     from rich.text import Text
 
