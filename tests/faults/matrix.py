@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from tests.faults.rows import Row
 
-LENGTH = 2.3  # s, device time
-EARLIEST, LATEST = 1.3, 1.6  # s
+_WHOLE = ((1.3, 1.6), 2.3)  # s: when the fault comes, and the end of the run
+_SHORT = ((0.35, 0.65), 1.35)  # the same without probe and ramp, for faults that do not care for them
+_CARELESS = ("wire.", "host.")
 _AFTERWARDS = 60  # ticks that the board goes on without a host
 _LEASE = 600  # ticks after which the device has forgotten its host
 _REST, _PATIENCE = 200, 60  # ticks that the arm must rest; so many times
@@ -51,6 +52,8 @@ class Bench(NamedTuple):
     """A run before it begins."""
 
     rig: Rig
+    length: float  # s, device time
+    again: Rig  # the rig of a start afterwards
     plan: FaultPlan
     board: Board
     oracle: Oracle
@@ -61,7 +64,7 @@ def judge(row: Row, seed: int, *, rearm: bool = False, make: type[Board] = Board
     bench = prepare(row, seed, make)
     rig = bench.plan.on(bench.rig, bench.oracle, bench.board)
     with _session_of(seed):
-        session = Session(rig, duration=LENGTH, fast=True)
+        session = Session(rig, duration=bench.length, fast=True)
         outcome = outcome_of(session)
         verdict = _verdict(bench, row, rig, session, outcome)
         if rearm and row.rearms:
@@ -72,7 +75,7 @@ def judge(row: Row, seed: int, *, rearm: bool = False, make: type[Board] = Board
 def judge_plain(row: Row, seed: int) -> Verdict:
     """Do the same on the plain simulated rig, as far as there is something to judge."""
     bench = prepare(row, seed, Board, "backend.kind=sim")
-    session = Session(bench.plan.on(bench.rig, bench.oracle), duration=LENGTH, fast=True)
+    session = Session(bench.plan.on(bench.rig, bench.oracle), duration=bench.length, fast=True)
     outcome = outcome_of(session)
     columns, at = session.result().columns, bench.plan.faults[0].at
     begins = at if isinstance(at, float) else 0.0
@@ -85,7 +88,7 @@ def judge_plain(row: Row, seed: int) -> Verdict:
     if not peak <= row.most_rad:
         found.append(f"|x| reached {peak:.2f} rad; the envelope is {row.most_rad}")
     if outcome == "completed" and row.settled_mrad is not None:
-        found += _unsettled(session, LENGTH - 0.1, row.settled_mrad)
+        found += _unsettled(session, bench.length - 0.1, row.settled_mrad)
     return Verdict(outcome, outcome in row.right, reaction, tuple(found))
 
 
@@ -93,15 +96,20 @@ def prepare(row: Row, seed: int, make: type[Board], *overrides: str) -> Bench:
     """Make rig, plan, board and oracle of a cell; everything about them follows from the seed."""
     luck = random.Random(f"{row.fault} {seed}")
     fault = Fault.of(row.fault)
-    if not re.search("[:,]at=", row.fault):
-        fault.at = luck.uniform(EARLIEST, LATEST)
+    drawn = not re.search("[:,]at=", row.fault)
+    short = drawn and row.fault.startswith(_CARELESS)
+    window, length = _SHORT if short else _WHOLE
+    if drawn:
+        fault.at = luck.uniform(*window)
     arguments = _start(fault)
     phase = f"sim.encoder_phase_counts={luck.random():.4f}"
     zero = (arguments.get("count_offset", 0) + (1 << 23)) % (1 << 24) - (1 << 23)
-    rig = load_rig("bench-1khz", (*_RIG, phase, f"encoder.zero={zero}", *row.overrides, *overrides))
+    said = (*_RIG, phase, f"encoder.zero={zero}", *row.overrides, *overrides)
+    again = load_rig("bench-1khz", said)
+    rig = load_rig("bench-1khz", (*said, "supervisor.start=immediate")) if short else again
     plan = FaultPlan([fault], seed)
     oracle = Oracle(first_tick=arguments.get("first_tick", 0))
-    return Bench(rig, plan, make(rig, carrier="cobs", **arguments), oracle)
+    return Bench(rig, length, again, plan, make(rig, carrier="cobs", **arguments), oracle)
 
 
 def _start(fault: Fault) -> dict[str, int]:
@@ -142,7 +150,7 @@ def _verdict(bench: Bench, row: Row, rig: Rig, session: Session, outcome: str) -
     if board.state == State.RUN or board.applied_mV:
         found.append(f"state {board.state}, {board.applied_mV} mV long after the host has gone")
     if outcome == "completed" and row.settled_mrad is not None:
-        found += _unsettled(session, LENGTH - 0.1, row.settled_mrad)
+        found += _unsettled(session, bench.length - 0.1, row.settled_mrad)
     return Verdict(outcome, outcome in row.right, reaction, tuple(found))
 
 
@@ -177,7 +185,7 @@ def start_again(bench: Bench, seed: int) -> tuple[str, ...]:
     """Remove the fault, wait for the arm to rest, run again: it must follow within 2 s of RUNNING."""
     board, oracle = bench.board, bench.oracle
     board.link(up=True)
-    healthy = FaultPlan(seed=seed).on(bench.rig, oracle, board)
+    healthy = FaultPlan(seed=seed).on(bench.again, oracle, board)
     session = Session(healthy, duration=_FOLLOWS_WITHIN, fast=True)  # from here on the plant is well
     before = len(oracle.violations)
     _alone(bench, _LEASE)
