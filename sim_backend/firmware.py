@@ -109,14 +109,27 @@ def _compile(command: list[str], files: list[Path], target: Path) -> None:
 def _run(command: list[str]) -> str:
     try:
         done = subprocess.run(  # noqa: S603 - the compiler, with our own files
-            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_SECONDS, check=False
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_SECONDS,
+            check=False,
+            start_new_session=True,  # Ctrl-C is for us
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise OpenError(
             f"{command[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: {_INSTALL}"
         ) from error
+    if done.returncode < 0:
+        raise OpenError(
+            f"{command[0]}: the C compiler was interrupted (signal {-done.returncode}). Start again."
+        )
     if done.returncode:
-        said = [line.strip() for line in done.stderr.splitlines() if "error" in line] or [done.stderr[-200:]]
+        said = [line.strip() for line in done.stderr.splitlines() if "error" in line] or [
+            " ".join(done.stderr[-200:].split())
+        ]
         raise OpenError(
             f"{command[0]}: the virtual device does not compile: {said[0]}. "
             f"If it is a header that is missing: {_INSTALL}"

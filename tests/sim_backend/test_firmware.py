@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -104,6 +105,40 @@ def test_compiler_of_the_environment_that_is_not_there_is_named(monkeypatch: pyt
     said = complaint()
     assert "/no/such/cc" in said
     assert "CC" in said
+
+
+@pytest.mark.usefixtures("tree")
+def test_compiler_of_the_environment_that_is_no_command_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", '"')
+    assert "CC" in complaint()
+
+
+def script(folder: Path, text: str) -> str:
+    """Make a compiler of a few lines of Python."""
+    path = folder / "compiler"
+    path.write_text(f"#!{sys.executable}\nimport os, signal\n{text}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+@pytest.mark.usefixtures("tree")
+def test_compiler_that_was_interrupted_is_no_fault_of_the_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", script(tmp_path, "os.kill(os.getpid(), signal.SIGTERM)"))
+    said = complaint()
+    assert "interrupted" in said
+    assert "does not compile" not in said
+
+
+@pytest.mark.usefixtures("tree")
+def test_ctrl_c_does_not_reach_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = tmp_path / "told"
+    monkeypatch.setenv(
+        "CC", script(tmp_path, f"open({str(told)!r}, 'w').write(str(os.getsid(0)))\nraise SystemExit(1)")
+    )
+    complaint()
+    assert int(told.read_text()) != os.getsid(0)
 
 
 def test_source_that_does_not_compile_shows_its_first_error(tree: Path) -> None:
