@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import select
 import termios
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import can
 import serial
@@ -58,18 +58,21 @@ class CanLink:
         Interface, channel, bit rate.
     clock
         Slept on between two looks, where the interface has nothing that can be waited on.
+    listen_only
+        An slcan adapter is left as it is: nothing is written but what is sent.
     """
 
-    def __init__(self, settings: CanSettings, clock: Clock) -> None:
+    def __init__(self, settings: CanSettings, clock: Clock, *, listen_only: bool = False) -> None:
         self.name = f"{settings.interface} {settings.channel}"
-        self._settings, self._clock = settings, clock
+        self._settings, self._clock, self._listen_only = settings, clock, listen_only
         self._bus: can.BusABC | None = None
+        self._corrupt = 0  # of the bus that was closed last
         self._poll: select.poll | None = None
 
     @property
     def corrupt(self) -> int:
         """What arrived so far and was no frame; most interfaces keep that to themselves."""
-        return self._bus.corrupt if isinstance(self._bus, SlcanBus) else 0
+        return self._bus.corrupt if isinstance(self._bus, SlcanBus) else self._corrupt
 
     def open(self) -> None:
         """Open the interface.
@@ -79,18 +82,22 @@ class CanLink:
         OpenError
             If there is no such interface or channel, or it cannot be opened.
         ConfigError
-            If the interface reaches beyond this machine.
+            If the interface is not one for a motor, or python-can has no such one.
         """
-        self._bus = bus = _open_bus(self._settings)
+        self._bus = bus = _open_bus(self._settings, listen_only=self._listen_only)
         try:
-            number = bus.fileno()
+            poll = select.poll()
+            poll.register(bus.fileno(), select.POLLIN)
         except (NotImplementedError, *FAILURES):
-            return
-        self._poll = select.poll()
-        self._poll.register(number, select.POLLIN)
+            return  # it is looked at instead
+        except BaseException:
+            self.close()
+            raise
+        self._poll = poll
 
     def close(self) -> None:
         """Close the interface."""
+        self._corrupt = self.corrupt
         bus, self._bus, self._poll = self._bus, None, None
         if bus is None:
             return
@@ -149,9 +156,8 @@ class CanLink:
     def _check_bus(self, message: can.Message) -> None:
         if message.arbitration_id & _BUS_OFF:
             raise LinkError(
-                f"{self.name}: bus-off. Check termination (120 ohm at both ends), bit rate and wiring, "
-                f"then bring the "
-                f"interface up again: ip link set {self._settings.channel} down, then up."
+                f"{self.name}: bus-off. Check termination (120 ohm at both ends), bit rate and wiring, then "
+                f"bring the interface up again: ip link set {self._settings.channel} down, then up."
             )
 
     def _opened(self) -> can.BusABC:
@@ -162,13 +168,35 @@ class CanLink:
     def _broken(self, error: BaseException) -> LinkError:
         return LinkError(
             f"{self.name}: the connection broke ({reason(error)}). The device goes to 0 V by itself. Look at "
-            f"adapter, cable "
-            "and bus, then start again."
+            "adapter, cable and bus, then start again."
         )
 
 
-def _open_bus(settings: CanSettings) -> can.BusABC:
+def _open_bus(settings: CanSettings, *, listen_only: bool) -> can.BusABC:
+    _check_interface(settings)
     interface, channel = settings.interface, settings.channel
+    try:
+        if interface == "slcan":
+            return SlcanBus(path_of(str(channel)), settings.baud, settings.bitrate, listen_only=listen_only)
+        return can.Bus(
+            channel=channel,
+            interface=interface,
+            bitrate=settings.bitrate,
+            ignore_config=True,
+            **settings.options,
+        )
+    except DcmpError:
+        raise
+    except (ImportError, can.CanInterfaceNotImplementedError) as error:
+        raise OpenError(
+            f"{interface}: its driver is missing: {_on_one_line(error)}. See python-can's page of it."
+        ) from error
+    except Exception as error:  # drivers raise whatever they like
+        raise _cannot_open(settings, error) from error
+
+
+def _check_interface(settings: CanSettings) -> None:
+    interface = settings.interface
     if interface in _NETWORKED:
         raise ConfigError(
             f'backend.interface: "{interface}" reaches over the network; a motor is driven from the machine '
@@ -184,21 +212,11 @@ def _open_bus(settings: CanSettings) -> can.BusABC:
             f'backend.interface: python-can has no "{interface}". It has: '
             f"{', '.join(sorted(can.VALID_INTERFACES))}."
         )
-    options: dict[str, Any] = dict(settings.options)
-    try:
-        if interface == "slcan":
-            return SlcanBus(path_of(str(channel)), settings.baud, settings.bitrate, **options)
-        return can.Bus(
-            channel=channel, interface=interface, bitrate=settings.bitrate, ignore_config=True, **options
+    if interface == "slcan" and settings.options:
+        raise ConfigError(
+            f"backend.options: got {', '.join(settings.options)}; slcan takes none. It is set up by channel, "
+            "baud and bitrate."
         )
-    except (ImportError, can.CanInterfaceNotImplementedError) as error:
-        raise OpenError(
-            f"{interface}: its driver is missing: {error}. See python-can's page of it."
-        ) from error
-    except DcmpError:
-        raise
-    except Exception as error:
-        raise _cannot_open(settings, error) from error  # drivers raise whatever they like
 
 
 def _cannot_open(settings: CanSettings, error: BaseException) -> OpenError:
@@ -211,9 +229,13 @@ def _cannot_open(settings: CanSettings, error: BaseException) -> OpenError:
         else "its driver is installed."
     )
     return OpenError(
-        f"{settings.interface} {settings.channel}: cannot be opened: {cause}. Check backend.channel and that "
-        f"{hint}"
+        f"{settings.interface} {settings.channel}: cannot be opened: {_on_one_line(cause)}. Check "
+        f"backend.channel and that {hint}"
     )
+
+
+def _on_one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()).rstrip(".") or type(error).__name__
 
 
 def _is_full(error: can.CanOperationError) -> bool:

@@ -33,8 +33,7 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
     if number in (errno.EACCES, errno.EPERM):
         return OpenError(
             f"{path}: you may not open it. Become a member of its group: sudo usermod -aG dialout $USER, "
-            f"then log "
-            "out and in."
+            "then log out and in."
         )
     if number in _BUSY:
         by = holder(path)

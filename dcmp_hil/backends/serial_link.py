@@ -47,11 +47,13 @@ class SerialLink:
         Path, or the serial number of its USB adapter.
     baud
         Bit/s.
+    listen_only
+        Nothing is written but what is sent.
     """
 
-    def __init__(self, port: str, baud: int) -> None:
+    def __init__(self, port: str, baud: int, *, listen_only: bool = False) -> None:
         self.name = port
-        self._baud = baud
+        self._baud, self._listen_only = baud, listen_only
         self._serial: serial.Serial | None = None
         self._poll = select.poll()
         self._receiver = cobs.Receiver()
@@ -72,19 +74,22 @@ class SerialLink:
         """
         self.name = path = path_of(self.name)
         self._serial = port = open_port(path, self._baud)
-        self._poll.register(port.fileno(), select.POLLIN)
-        self._write(_DELIMITER)  # ends whatever the line carried before
+        try:
+            self._poll = select.poll()
+            self._poll.register(port.fileno(), select.POLLIN)
+            if not self._listen_only:
+                self._write(_DELIMITER)  # ends whatever the line carried before
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Close the port."""
         port, self._serial = self._serial, None
         if port is None:
             return
-        try:
-            self._poll.unregister(port.fileno())
+        with contextlib.suppress(*FAILURES):  # it is gone: that is closed
             port.close()
-        except FAILURES:
-            pass  # it is gone: that is closed
 
     def send(self, frame: Frame) -> None:
         """Send a frame; what the port has no room for is dropped, for the device to refuse.
@@ -153,6 +158,9 @@ def open_port(path: str, baud: int) -> serial.Serial:
         port.set_low_latency_mode(True)
     except (*FAILURES, NotImplementedError):
         pass  # most ports have no such mode; the round trip is measured before arming
+    except BaseException:
+        port.close()
+        raise
     return port
 
 

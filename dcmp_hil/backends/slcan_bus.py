@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import can
 
@@ -40,8 +40,8 @@ class SlcanBus(can.BusABC):
         Of the serial line, bit/s.
     bitrate
         Of the bus, bit/s.
-    options
-        For python-can.
+    listen_only
+        Nothing is written but what is sent: a closed adapter stays closed, and silent.
 
     Raises
     ------
@@ -51,18 +51,22 @@ class SlcanBus(can.BusABC):
         If slcan has no such bit rate.
     """
 
-    def __init__(self, path: str, baud: int, bitrate: int, **options: Any) -> None:
+    def __init__(self, path: str, baud: int, bitrate: int, *, listen_only: bool = False) -> None:
         if bitrate not in _BITRATES:
             raise ConfigError(
                 f"backend.bitrate: got {bitrate}; slcan has {', '.join(map(str, _BITRATES))} bit/s."
             )
         self._receiver = slcan.Receiver()
         self._frames: deque[Frame] = deque()
+        self._listen_only = listen_only
         self._port: serial.Serial = open_port(path, baud)
         self.channel_info = f"slcan {path}"
-        for command in ("", "C", f"S{_BITRATES[bitrate]}", "O"):  # the empty one ends what came before
-            self._command(command)
-        super().__init__(path, **options)
+        try:
+            self._command("", "C", f"S{_BITRATES[bitrate]}", "O")  # the empty one ends what came before
+            super().__init__(path)
+        except BaseException:
+            self._port.close()
+            raise
 
     @property
     def corrupt(self) -> int:
@@ -84,8 +88,11 @@ class SlcanBus(can.BusABC):
             self._command("C")
         self._port.close()
 
-    def _command(self, command: str) -> None:
-        write_now(self._port, command.encode() + b"\r")
+    def _command(self, *commands: str) -> None:
+        if self._listen_only:
+            return
+        for command in commands:
+            write_now(self._port, command.encode() + b"\r")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002
         if not self._frames:
