@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
 
 from dcmp_hil.backends.caller import Caller
 from dcmp_hil.backends.links import make_link
 from dcmp_hil.config.backends import Can, Serial
-from dcmp_hil.errors import DcmpError
+from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.faults import name_of
 from dcmp_hil.wire.messages import Hello, Identity, SampleReport, State
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -20,14 +23,17 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
 
 _LISTEN = 0.25  # s; a device sends every period, from boot on
+_TICKS = 256
 _OTHER = 7  # fault class of every code from 7 on
 _ASKS_ONLY = 0  # the session of a HELLO that owns nothing
 _DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
+_KEYS = ("kind", "port", "interface", "channel")  # that a command names always
+_UNUSUAL = ("node", "baud", "bitrate")  # that it names where they are not the default
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is on one port or channel.
+    """What is on one port or channel: a device, one of several, or nothing of ours.
 
     Parameters
     ----------
@@ -50,8 +56,8 @@ class Finding:
 def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) -> Iterator[Finding]:
     """Look at every serial port and CAN channel, and at ports named besides.
 
-    It asks only where a device of ours is heard; before that it sends only what opens a line (one 0x00, and
-    the slcan commands C, S8, O).
+    It listens first, and writes nothing: it asks only where a device of ours was heard. Other people's
+    equipment is left alone.
 
     Parameters
     ----------
@@ -61,11 +67,30 @@ def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) ->
         Bit/s, of serial ports and CAN buses.
     clock
         Times the listening.
+
+    Raises
+    ------
+    ConfigError
+        If a name cannot be that of a port.
     """
+    for path in extra:
+        _check_name(path)
     for path, description in _serial_ports(extra):
-        yield _look_at_serial(path, description, baud, clock)
+        cobs = Serial(kind="serial", port=path, baud=baud)
+        slcan = Can(kind="can", interface="slcan", channel=path, baud=baud, bitrate=bitrate)
+        yield from _look_at(path, description, (cobs, slcan), clock)
     for interface, channel in _can_channels():
-        yield _look_at_can(interface, channel, bitrate, clock)
+        settings = Can(kind="can", interface=interface, channel=channel, bitrate=bitrate)
+        yield from _look_at(f"{interface} {channel}", "CAN", (settings,), clock)
+
+
+def _check_name(path: str) -> None:
+    try:
+        Serial(kind="serial", port=path)
+    except ValidationError as error:
+        raise ConfigError(
+            f'PORT: got "{path}"; expected the path of a serial port, such as /dev/ttyACM0.'
+        ) from error
 
 
 def _serial_ports(extra: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -82,66 +107,71 @@ def _can_channels() -> Iterator[tuple[str, str]]:
     import can
 
     logging.disable(logging.ERROR)  # every driver that is not installed says so
+    configs: list[Any] = []
     try:
-        configs = can.detect_available_configs(interfaces=_DRIVERS)
+        for driver in _DRIVERS:
+            with contextlib.suppress(Exception):  # drivers raise whatever they like
+                configs.extend(can.detect_available_configs(interfaces=driver))
     finally:
         logging.disable(logging.NOTSET)
     for config in configs:
         yield config["interface"], str(config["channel"])
 
 
-def _look_at_serial(path: str, description: str, baud: int, clock: Clock) -> Finding:
-    first = ""
-    for settings, keys in (
-        (Serial(kind="serial", port=path, baud=baud), ("kind=serial", f"port={path}")),
-        (
-            Can(kind="can", interface="slcan", channel=path, baud=baud),
-            ("kind=can", "interface=slcan", f"channel={path}"),
-        ),
-    ):
-        answer, found = _ask(settings, clock)
-        if found:
-            return Finding(path, description, keys, answer)
-        first = first or answer
-        if answer and "nothing" not in answer and "damaged" not in answer:
-            break  # it cannot even be opened
-    return Finding(path, description, (), first)
+def _look_at(place: str, description: str, ways: Sequence[Serial | Can], clock: Clock) -> Iterator[Finding]:
+    """Try one way of speaking after the other, until a device is heard."""
+    damaged = False
+    try:
+        for settings in ways:
+            devices, corrupt = _ask(settings, clock)
+            damaged = damaged or corrupt
+            for node, words in devices.items():
+                yield Finding(place, description, _keys(settings, node), words)
+            if devices:
+                return
+    except DcmpError as error:
+        remark = str(error).partition(": ")[2] or str(error)
+    else:
+        remark = "damaged frames: another baud rate?" if damaged else "nothing heard"
+    yield Finding(place, description, (), remark)
 
 
-def _look_at_can(interface: str, channel: str, bitrate: int, clock: Clock) -> Finding:
-    settings = Can(kind="can", interface=interface, channel=channel, bitrate=bitrate)
-    answer, found = _ask(settings, clock)
-    keys = ("kind=can", f"interface={interface}", f"channel={channel}") if found else ()
-    return Finding(f"{interface} {channel}", "CAN", keys, answer)
+def _keys(settings: Serial | Can, node: int) -> tuple[str, ...]:
+    """Return the keys of `[backend]` that reach a node."""
+    values = {**settings.model_dump(), "node": node}
+    usual = type(settings).model_fields
+    named = [key for key in _KEYS if key in values]
+    named += [key for key in _UNUSUAL if key in values and values[key] != usual[key].default]
+    return tuple(f"{key}={values[key]}" for key in named)
 
 
-def _ask(settings: Serial | Can, clock: Clock) -> tuple[str, bool]:
-    """Return what is at the other end, in words, and whether it is a device of ours."""
+def _ask(settings: Serial | Can, clock: Clock) -> tuple[dict[int, str], bool]:
+    """Return the devices at the other end, in words, and whether damaged frames came."""
     link = make_link(settings, clock)
     try:
         link.open()
-    except DcmpError as error:
-        return str(error).partition(": ")[2] or str(error), False
-    try:
-        caller = Caller(link, clock, 0)
-        node = _hear_node(caller, clock)
-        if node is None:
-            return ("damaged frames: another baud rate?" if link.corrupt else "nothing heard"), False
-        return _describe(Caller(link, clock, node), node), True
-    except DcmpError as error:
-        return str(error).partition(": ")[2] or str(error), False
+        nodes = _hear_nodes(Caller(link, clock, 0), clock)
+        return {node: _describe(Caller(link, clock, node), node) for node in nodes}, link.corrupt > 0
     finally:
         link.close()
 
 
-def _hear_node(caller: Caller, clock: Clock) -> int | None:
-    """Return the node of the first device heard."""
+def _hear_nodes(caller: Caller, clock: Clock) -> list[int]:
+    """Return the nodes that were heard: two SAMPLEs, one tick after the other, are no accident."""
     deadline_ns = clock.now_ns() + int(1e9 * _LISTEN)
+    ticks: dict[int, int] = {}
+    nodes = set()
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
         heard = caller.overhear(1e-9 * left_ns)
-        if heard is not None and isinstance(heard[1], SampleReport):
-            return heard[0]
-    return None
+        if heard is None:
+            continue
+        node, sample = heard
+        if not isinstance(sample, SampleReport):
+            continue
+        if ticks.get(node) == (sample.tick - 1) % _TICKS:
+            nodes.add(node)
+        ticks[node] = sample.tick
+    return sorted(nodes)
 
 
 def _describe(caller: Caller, node: int) -> str:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def make_link(settings: Section, clock: Clock) -> Link:
-    """Make the link that `[backend]` describes, not yet open.
+    """Make the link that `[backend]` describes, not yet open; by itself it writes nothing to a serial port.
 
     Raises
     ------
@@ -24,11 +24,11 @@ def make_link(settings: Section, clock: Clock) -> Link:
     if isinstance(settings, Serial):
         from dcmp_hil.backends.serial_link import SerialLink
 
-        return SerialLink(settings.port, settings.baud)
+        return SerialLink(settings.port, settings.baud, listen_only=True)
     if isinstance(settings, Can):
         from dcmp_hil.backends.can_link import CanLink
 
-        return CanLink(settings, clock)
+        return CanLink(settings, clock, listen_only=True)
     raise ConfigError(
         f'backend.kind: got "{getattr(settings, "kind", "")}", which has no wire to listen to. Use "serial" '
         'or "can", such as --set backend.kind=serial --set backend.port=/dev/ttyACM0.'

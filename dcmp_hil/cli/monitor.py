@@ -17,9 +17,10 @@ def monitor(
         bool, typer.Option("--all", help="Every SAMPLE and DRIVE, not ten a second.")
     ] = False,
 ) -> None:
-    """Print what travels on a link, decoded, without taking part: no session, no message is sent.
+    """Print what travels on a link, decoded, without taking part: no session, nothing is sent.
 
-    A serial port has one reader: while a run has it, this says so and ends.
+    A serial port has one reader: while a run has it, this says so and ends. An slcan adapter that is closed
+    stays silent, for only a command opens it: let slcand do so, and watch its socketcan interface.
     """
     from dcmp_hil.cli.monitoring import watch
     from dcmp_hil.config import load_rig

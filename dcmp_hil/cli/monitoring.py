@@ -44,13 +44,13 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
     """Print messages for `duration` (s, 0 for ever) or until somebody ends it; return the exit code."""
     clock = MonotonicClock()
     link = make_link(rig.backend, clock)
-    link.open()
-    began_ns = clock.now_ns()
-    until_ns = began_ns + 1e9 * duration if duration else math.inf
     caller, brief = Caller(link, clock, 0), _Brief()
     heard = 0
-    console.note(f"listening on {link.name}; Ctrl-C ends it")
     try:
+        link.open()
+        console.note(f"listening on {link.name}; Ctrl-C ends it")
+        began_ns = clock.now_ns()
+        until_ns = began_ns + 1e9 * duration if duration else math.inf
         with StopRequest() as stop:
             while not stop.requested and (now_ns := clock.now_ns()) < until_ns:
                 found = caller.overhear(_LOOK)
@@ -60,8 +60,8 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
                 if all_frames or brief.lets_through(*found, now_ns):
                     _show(1e-9 * (now_ns - began_ns), *found)
     finally:
-        damaged = link.corrupt + caller.corrupt
         link.close()
+    damaged = link.corrupt + caller.corrupt
     console.note(f"{heard} messages, {damaged} damaged frames")
     return stop.exit_code
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Annotated
 
 import typer
@@ -23,8 +24,9 @@ def ports(
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
-    It asks only where a device of this project is heard. Before that it sends what opens a line: one byte
-    0x00, and the slcan commands C, S8, O.
+    It listens first and writes nothing, and asks only where a device of this project is heard. An slcan
+    adapter that is closed stays silent, for only a command opens it: a run does, and slcand. A CAN adapter
+    that is opened takes part in its bus: name the right --bitrate.
     """
     from rich.text import Text
 
@@ -37,8 +39,8 @@ def ports(
         console.out.print(Text.assemble((finding.place, "bold"), f"  {finding.description}"))
         console.out.print(Text(f"    {finding.device}", "green" if finding.settings else "dim"))
         if finding.settings:
-            keys = " ".join(f"--set backend.{key}" for key in finding.settings)
-            console.out.print(Text(f"    dcmp-hil run {keys}"))
+            sets = [word for key in finding.settings for word in ("--set", f"backend.{key}")]
+            console.out.print(Text(f"    {shlex.join(['dcmp-hil', 'run', *sets])}"))
     if not found:
         console.note(
             "No serial port and no CAN channel here. `dcmp-hil device` makes a virtual one; name its port "

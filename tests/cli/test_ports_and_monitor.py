@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
+import signal
 import subprocess
 import sys
 import threading
@@ -11,14 +14,25 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends import open_backend
+from dcmp_hil.config import load_rig
+from dcmp_hil.config.backends import Can, Serial
+from dcmp_hil.errors import OpenError
+from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.codec import pack
+from dcmp_hil.wire.messages import SampleReport, State
+from sim_backend.board import Board
+from tests.backends.line import line
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import PatientClock, on_bench
+from tests.contract.pump import Pump, VirtualBus
 from tests.contract.test_contract import drive
 from tests.firmware.core_library import compiler
+from tests.helpers import bench
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.config import Rig
     from tests.cli.conftest import Outcome
 
     Cli = Callable[..., Outcome]
@@ -93,6 +107,155 @@ def test_ports_says_what_to_do_where_there_is_nothing(cli: Cli, monkeypatch: pyt
     outcome = cli("ports")
     assert outcome.code == 0
     assert "dcmp-hil device" in outcome.err
+
+
+_SAMPLE = SampleReport(0, 0, 7, State.IDLE, missed=True, limited=False, fault_class=0)
+_FOREIGN = {
+    "silence": b"",
+    "text": b"$GPGGA,123519,4807.038,N*47\r\n",
+    "one sample again and again": cobs.encode(pack(_SAMPLE)),
+    "one slcan sample again and again": slcan.encode(pack(_SAMPLE)),
+}
+
+
+@pytest.mark.parametrize("said", list(_FOREIGN.values()), ids=list(_FOREIGN))
+def test_ports_writes_nothing_where_no_device_is_heard(cli: Cli, said: bytes) -> None:
+    with line(said) as far:
+        outcome = cli("ports", far.path)
+        assert far.heard() == b""
+    assert outcome.code == 0
+    assert "--set" not in outcome.out
+
+
+@pytest.mark.parametrize("carrier", ["cobs", "slcan"])
+def test_monitor_writes_nothing(cli: Cli, carrier: str) -> None:
+    said = (cobs if carrier == "cobs" else slcan).encode(pack(_SAMPLE))
+    with line(said) as far:
+        outcome = cli("monitor", "--duration", "0.3", *_way_to(far.path, carrier))
+        assert far.heard() == b""
+    assert "Sample" in outcome.out
+
+
+def _way_to(path: str, carrier: str) -> list[str]:
+    where = {
+        "cobs": ("backend.kind=serial", f"backend.port={path}"),
+        "slcan": ("backend.kind=can", "backend.interface=slcan", f"backend.channel={path}"),
+    }
+    rig = {"cobs": "bench-serial", "slcan": "bench-can"}
+    return [rig[carrier], *(word for key in where[carrier] for word in ("--set", key))]
+
+
+def commands(outcome: Outcome) -> list[Rig]:
+    """Return the rig that each printed command runs."""
+    rigs = []
+    for printed in outcome.out.splitlines():
+        words = shlex.split(printed) if "dcmp-hil run" in printed else []
+        if words:
+            assert words[:2] == ["dcmp-hil", "run"]
+            rigs.append(load_rig("bench-1khz", words[3::2]))
+    return rigs
+
+
+@pytest.mark.parametrize("carrier", ["cobs", "slcan"])
+def test_ports_names_what_is_not_the_default(cli: Cli, carrier: str) -> None:
+    with device(carrier=carrier) as pump:
+        (usual,) = commands(cli("ports", path_of(pump)))
+    assert "node" not in usual.backend.model_fields_set
+    node = ("backend.kind=sim-board", "backend.node=3")
+    with device(*node, carrier=carrier) as pump:
+        outcome = cli("ports", path_of(pump), "--baud", "500000", "--bitrate", "250000")
+    (rig,) = commands(outcome)
+    found = rig.backend
+    assert "node 3, firmware" in outcome.out
+    if carrier == "cobs":
+        assert found == Serial(kind="serial", port=path_of(pump), baud=500_000, node=3)
+    else:
+        assert found == Can(
+            kind="can", interface="slcan", channel=path_of(pump), baud=500_000, bitrate=250_000, node=3
+        )
+
+
+def test_ports_lists_every_device_of_a_bus(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    channel = "ports-two-devices"
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
+    pumps = []
+    for node in (9, 2):
+        rig = bench("backend.kind=sim-board", f"backend.node={node}")
+        pumps.append(Pump(Board(rig, carrier="can"), VirtualBus(channel)))
+    for pump in pumps:
+        pump.start()
+    try:
+        outcome = cli("ports")
+    finally:
+        for pump in pumps:
+            pump.close()
+    nodes = [rig.backend.node for rig in commands(outcome) if isinstance(rig.backend, Can)]
+    assert nodes == [2, 9], outcome.out
+    assert outcome.out.count("firmware 0.1") == 2
+
+
+def test_ports_goes_on_where_a_driver_fails_in_looking(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    def detect(interfaces: str) -> list[dict[str, str]]:
+        if interfaces == "gs_usb":
+            raise ValueError("no backend available")
+        return [{"interface": "virtual", "channel": "nobody"}] if interfaces == "pcan" else []
+
+    monkeypatch.setattr("can.detect_available_configs", detect)
+    outcome = cli("ports")
+    assert outcome.code == 0
+    assert "virtual nobody" in outcome.out
+
+
+@pytest.mark.parametrize("arguments", [["--baud", "5"], ["--bitrate", "5"], [""], ["/dev/" + 200 * "x"]])
+def test_ports_refuses_what_cannot_be(cli: Cli, arguments: list[str]) -> None:
+    outcome = cli("ports", *arguments)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+
+
+def test_ports_and_monitor_close_what_could_not_be_opened(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[str] = []
+
+    class Broken:
+        name, corrupt = "broken", 0
+
+        def open(self) -> None:
+            raise OpenError("broken: cannot be opened. Mend it.")
+
+        def close(self) -> None:
+            closed.append(self.name)
+
+    for room in ("dcmp_hil.backends.discovery", "dcmp_hil.cli.monitoring"):
+        monkeypatch.setattr(f"{room}.make_link", lambda *_: Broken())
+    assert cli("ports", "/dev/ttyX").code == 0
+    assert closed
+    closed.clear()
+    assert cli("monitor").code == 3
+    assert closed
+
+
+def test_monitor_counts_what_was_damaged_on_slcan(cli: Cli) -> None:
+    with line(b"t04\r") as far:
+        outcome = cli("monitor", "--duration", "0.3", *_way_to(far.path, "slcan"))
+    assert outcome.code == 0
+    found = re.search(r"0 messages, (\d+) damaged", outcome.err)
+    assert found is not None, outcome.err
+    assert int(found[1]) > 0
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_monitor_ends_with_the_code_of_its_signal(number: signal.Signals, code: int) -> None:
+    with line(cobs.encode(pack(_SAMPLE))) as far:
+        command = [sys.executable, "-m", "dcmp_hil", "monitor", *_way_to(far.path, "cobs")]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            process.stdout.readline()  # it is listening
+            process.send_signal(number)
+            _, err = process.communicate(timeout=30)
+    assert process.returncode == code, err
 
 
 def test_monitor_shows_samples_ten_times_a_second_or_all(cli: Cli) -> None:
