@@ -74,7 +74,7 @@ class Line:
 def run_row(place: int, seeds: Sequence[int]) -> Line:
     """Run a row of the matrix; every 25th run goes on with a healthy one."""
     row = ROWS[place]
-    line = Line(row.fault, row.bound_ms, open=row.open)
+    line = Line(row.name, row.bound_ms, open=row.open)
     for seed in seeds:
         line.add(seed, judge(row, seed, rearm=seed % _AGAIN == 0))
     return line

@@ -63,7 +63,7 @@ def judge(row: Row, seed: int, *, rearm: bool = False, make: type[Board] = Board
     """Run a row with a seed, and judge it; on request start again afterwards, without the fault."""
     bench = prepare(row, seed, make)
     rig = bench.plan.on(bench.rig, bench.oracle, bench.board)
-    with _session_of(seed):
+    with same_session(seed):
         session = Session(rig, duration=bench.length, fast=True)
         outcome = outcome_of(session)
         verdict = _verdict(bench, row, rig, session, outcome)
@@ -94,7 +94,7 @@ def judge_plain(row: Row, seed: int) -> Verdict:
 
 def prepare(row: Row, seed: int, make: type[Board], *overrides: str) -> Bench:
     """Make rig, plan, board and oracle of a cell; everything about them follows from the seed."""
-    luck = random.Random(f"{row.fault} {seed}")
+    luck = random.Random(f"{row.name} {seed}")
     fault = Fault.of(row.fault)
     drawn = not re.search("[:,]at=", row.fault)
     short = drawn and row.fault.startswith(_CARELESS)
@@ -201,7 +201,7 @@ def start_again(bench: Bench, seed: int) -> tuple[str, ...]:
 
 
 @contextmanager
-def _session_of(seed: int) -> Iterator[None]:
+def same_session(seed: int) -> Iterator[None]:
     """Let the host choose the same sessions every time: their bytes decide what a flipped bit does."""
     luck = random.Random(seed)
     with patch.object(secrets, "randbelow", luck.randrange):

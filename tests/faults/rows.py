@@ -32,6 +32,11 @@ class Row(NamedTuple):
     rearms: bool = True  # afterwards a healthy run starts and follows
     open: str = ""  # what the product does not do yet: such a row is counted and shown, and fails nothing
 
+    @property
+    def name(self) -> str:
+        """What the table calls it."""
+        return " ".join((self.fault, *self.overrides))
+
 
 def _at_once(fault: str, right: frozenset[str], bound_ms: float = 2.0, **more: float) -> Row:
     return Row(fault, right, bound_ms, **more)  # type: ignore[arg-type]
@@ -93,6 +98,7 @@ FIRMWARE = (
     Row("firmware.start:count=8388500,at=boot"),
     Row("firmware.start:count=2147483500,at=boot"),
 )
+_TURNING = ("reference.rate_rad_s=2.0",)  # the reference turns round while the fault comes
 PLANT = (
     Row("plant.enc_stuck", ENCODER_OFF, _DETECTED_MS, 3.0, 8.0),
     Row("plant.enc_glitch:counts=200", open="one outlier ends the run, as a disturbance"),
@@ -106,6 +112,17 @@ PLANT = (
     Row("plant.motor_sign", REVERSED, 300.0, 2.0, 3.0),
     Row("plant.motor_sign:at=boot", REVERSED, 600.0, 0.1, 3.0),
     Row("plant.power", MOTOR_OFF, _DETECTED_MS, 2.0, 8.0),
+    Row(
+        "plant.enc_stuck",
+        ENCODER_OFF,
+        bound_ms=_DETECTED_MS,
+        most_rad=3.0,
+        most_rad_s=8.0,
+        overrides=_TURNING,
+        open="if found within 60 ms, the window still has movement in it: told as power",
+    ),
+    Row("plant.motor_sign", REVERSED, 300.0, 2.0, 5.0, overrides=_TURNING),  # 2 rad/s are asked for
+    Row("plant.power", MOTOR_OFF, _DETECTED_MS, 2.0, 8.0, overrides=_TURNING),
     Row("plant.power:at=boot", MOTOR_OFF, 600.0, 0.2, 3.0),
     Row("plant.gain:factor=0.6"),
     Row("plant.gain:factor=1.5"),
@@ -141,6 +158,12 @@ HOST = (
     ),
     _at_once("host.spoil:where=demand,value=inf", NUMBER),
     _at_once("host.spoil:where=sample.position,value=-inf", NUMBER),
+    Row(
+        "host.spoil:where=sample.t,value=inf",
+        NUMBER,
+        bound_ms=2.0,
+        open="the reference is asked for its value at t = inf before the supervisor looks: ValueError",
+    ),
     _at_once("host.raise:where=controller", frozenset({"InjectedError"})),
     _at_once("host.raise:where=controller,what=base", frozenset({"InjectedBaseError"})),
     _at_once("host.raise:where=observer", frozenset({"InjectedError"})),

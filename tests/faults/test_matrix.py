@@ -22,7 +22,7 @@ def cells(rows: tuple[Row, ...]) -> list[object]:
     return [
         pytest.param(
             row,
-            id=row.fault,
+            id=row.name,
             marks=pytest.mark.xfail(reason=row.open, strict=False) if row.open else (),
         )
         for row in rows

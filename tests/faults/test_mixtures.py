@@ -1,0 +1,72 @@
+"""Several faults at once, drawn at random: whatever comes of it, the oracle has nothing to say."""
+
+from __future__ import annotations
+
+import os
+import random
+
+import pytest
+
+from dcmp_hil import errors
+from dcmp_hil.session import Session
+from dcmp_hil.values import Fault as Code
+from sim_backend.board import Board
+from sim_backend.fault_kinds.effect import Choice
+from sim_backend.faults import KINDS, Fault, FaultPlan
+from tests.faults.matrix import outcome_of, same_session
+from tests.faults.oracle import Oracle
+from tests.helpers import bench
+
+SEEDS = 20 * int(os.environ.get("DCMP_FAULT_SEEDS", "2"))
+LENGTH = 1.0  # s
+_FROM_BOOT = 0.15
+_OPEN = {"sample.t"}  # see the matrix's open rows
+ON_PURPOSE = {"completed", "InjectedError", "InjectedBaseError", *(code.name for code in Code)}
+REASONS = {
+    *("speed", "travel", "disturbance", "stuck", "power", "polarity", "not_finite", "gain", "moving"),
+    *("error", "saturation", "lateness", "stale", "jump"),
+}
+pytestmark = pytest.mark.usefixtures("untraced")
+
+
+def drawn(luck: random.Random) -> Fault:
+    """Draw a fault with parameters anywhere in their bounds, small ones as often as large ones."""
+    name = luck.choice([kind for kind in KINDS if kind != "firmware.start"])
+    params: dict[str, float | str] = {}
+    for key, param in KINDS[name].params.items():
+        if isinstance(param, Choice):
+            params[key] = luck.choice([word for word in param.words if word not in _OPEN])
+        else:
+            params[key] = min(param.high, max(param.low, param.default * 10 ** luck.uniform(-1.5, 1.5)))
+    at = "boot" if luck.random() < _FROM_BOOT else luck.uniform(0.0, 0.8)
+    return Fault(name, at, luck.uniform(0.001, 0.4), **params)
+
+
+def mixed(seed: int) -> tuple[str, list[str], list[str]]:
+    """Run a mixture; return how it ended, what the oracle says, and what went wrong on purpose."""
+    luck = random.Random(f"mixture {seed}")
+    faults = [drawn(luck) for _ in range(luck.randrange(1, 5))]
+    rig = bench("backend.kind=sim-board", "supervisor.start=immediate")
+    oracle = Oracle()
+    made = FaultPlan(faults, seed).on(rig, oracle, Board(rig))
+    with same_session(seed):
+        outcome = outcome_of(Session(made, duration=LENGTH, fast=True))
+    return (
+        outcome,
+        oracle.violations,
+        [f"{fault.kind} {fault.at} {fault.for_} {fault.params}" for fault in faults],
+    )
+
+
+def is_known(outcome: str) -> bool:
+    """Whether a run may end like that."""
+    kind = getattr(errors, outcome, None)
+    return outcome in ON_PURPOSE | REASONS or (kind is not None and issubclass(kind, errors.DcmpError))
+
+
+@pytest.mark.parametrize("first", range(0, SEEDS, 10))
+def test_no_mixture_of_faults_breaks_a_rule(first: int) -> None:
+    for seed in range(first, first + 10):
+        outcome, violations, faults = mixed(seed)
+        assert is_known(outcome), (seed, outcome, faults)
+        assert violations == [], (seed, faults)
