@@ -9,7 +9,7 @@ import statistics
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,6 +59,10 @@ class Line:
     def right_percent(self) -> float:
         """How often the cause was told right."""
         return 100.0 * self.right / self.runs
+
+    def figures(self) -> dict[str, object]:
+        """Return everything, for JSON."""
+        return {**vars(self), "outcomes": dict(self.outcomes), "right_percent": self.right_percent}
 
     def __str__(self) -> str:
         """Return it as Markdown."""
@@ -143,7 +147,7 @@ def main() -> int:
     if asked.markdown:
         asked.markdown.write_text("".join(said), encoding="utf-8")
     if asked.json:
-        figures = [{**asdict(line), "right_percent": line.right_percent} for line in table]
+        figures = [line.figures() for line in table]
         asked.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     return code
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tests.faults.matrix import Verdict
@@ -29,6 +31,12 @@ def test_a_line_has_runs_violations_diagnoses_and_times() -> None:
     assert str(line(GOOD, WRONG, BAD, GOOD)) == (
         "| `plant.enc_stuck` | 4 | 1 | 75 | 90 | 120 | 600 | stuck 3, power 1 |"
     )
+
+
+def test_figures_of_a_line_are_plain() -> None:
+    figures = json.loads(json.dumps(line(GOOD, WRONG, BAD).figures()))
+    assert figures["outcomes"] == {"stuck": 2, "power": 1}
+    assert figures["right_percent"] == pytest.approx(200.0 / 3.0)
 
 
 @pytest.mark.parametrize(
