@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import serial
 
 _CHUNK = 4096
+_OURS = b"NDCMP\r"  # what a device of this project answers to N
+_ANSWERED = 16_384  # bytes, among which that answer is
 _BITRATES = {
     rate: code
     for code, rate in enumerate(
@@ -59,10 +61,11 @@ class SlcanBus(can.BusABC):
         self._receiver = slcan.Receiver()
         self._frames: deque[Frame] = deque()
         self._listen_only = listen_only
+        self._first = b""  # of what was read
         self._port: serial.Serial = open_port(path, baud)
         self.channel_info = f"slcan {path}"
         try:
-            self._command("", "C", f"S{_BITRATES[bitrate]}", "O")  # the empty one ends what came before
+            self._command("", "C", f"S{_BITRATES[bitrate]}", "N", "O")  # the empty one ends what came before
             super().__init__(path)
         except BaseException:
             self._port.close()
@@ -82,10 +85,11 @@ class SlcanBus(can.BusABC):
         return self._port.fileno()
 
     def shutdown(self) -> None:
-        """Close the channel and the port."""
+        """Close the channel and the port; a device of ours goes on sending, for who only listens."""
         super().shutdown()
         with contextlib.suppress(*FAILURES):  # it is gone: that is closed
-            self._command("C")
+            if _OURS not in self._first:
+                self._command("C")
         self._port.close()
 
     def _command(self, *commands: str) -> None:
@@ -96,7 +100,10 @@ class SlcanBus(can.BusABC):
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002
         if not self._frames:
-            self._frames.extend(self._receiver.feed(self._port.read(_CHUNK)))
+            data = self._port.read(_CHUNK)
+            if len(self._first) < _ANSWERED:
+                self._first += data
+            self._frames.extend(self._receiver.feed(data))
         if not self._frames:
             return None, False
         frame = self._frames.popleft()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
 
 CARRIERS = pytest.mark.parametrize("carrier", ["cobs", "slcan"])
-OPENING = {"cobs": b"\0", "slcan": b"\rC\rS8\rO\r"}
+OPENING = {"cobs": b"\0", "slcan": b"\rC\rS8\rN\rO\r"}
 CLOSING = {"cobs": b"", "slcan": b"C\r"}
 MODULE = {"cobs": "serial_link", "slcan": "slcan_bus"}
 

@@ -109,6 +109,17 @@ def test_ports_says_what_to_do_where_there_is_nothing(cli: Cli, monkeypatch: pyt
     assert "dcmp-hil device" in outcome.err
 
 
+@pytest.mark.parametrize("carrier", ["cobs", "slcan"])
+def test_ports_finds_the_device_after_a_run(cli: Cli, carrier: str) -> None:
+    with on_bench(f"{carrier} pty") as found:
+        assert found.pump is not None
+        with found.device() as backend:
+            drive(backend, 1.0, 5)
+        found.hurry()
+        outcome = cli("ports", path_of(found.pump))
+    assert "node 0, firmware 0.1" in outcome.out
+
+
 _SAMPLE = SampleReport(0, 0, 7, State.IDLE, missed=True, limited=False, fault_class=0)
 _FOREIGN = {
     "silence": b"",
