@@ -25,6 +25,16 @@ def test_stop_request_notes_the_signal_and_puts_the_handlers_back(number: signal
     assert [signal.getsignal(each) for each in _ALL] == before
 
 
+@pytest.mark.parametrize(
+    ("number", "code"), [(None, 0), (signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_exit_code_is_that_of_the_signal_but_for_ctrl_c(number: signal.Signals | None, code: int) -> None:
+    with StopRequest() as stop:
+        if number is not None:
+            os.kill(os.getpid(), number)
+        assert stop.exit_code == code
+
+
 def test_stop_request_keeps_the_first_signal() -> None:
     with StopRequest() as stop:
         os.kill(os.getpid(), signal.SIGTERM)
