@@ -54,7 +54,7 @@ class Trajectory:
         """Return the reference at device time `t`."""
         if self._way_down is not None and t >= self._way_down.t0:
             return self._way_down.at(t)
-        if not self._begun:
+        if not self._begun or t < self._t0:
             return Reference(self._x0, 0.0, 0.0)
         since = t - self._t0
         reference = self._source.at(since)

@@ -477,3 +477,8 @@ def test_probe_is_no_tracking_error() -> None:
     assert np.isnan(error[t < 0.545]).all()
     assert not np.isnan(error[t > 0.555]).any()
     assert known(result.summary.tracking_max_rad) < 0.02
+
+
+def test_run_without_a_soft_start_has_a_start_like_any_other() -> None:
+    result = run(bench("reference.soft_start_s=0.0", "reference.kind=hold"), duration=1.0, fast=True)
+    assert result.summary.periods == 1000
