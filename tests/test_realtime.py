@@ -82,6 +82,7 @@ def helper() -> Iterator[int]:
 
 
 def _state() -> tuple[Any, ...]:
+    gc.collect()  # in Python 3.12 this freezes immortal objects too
     return (
         gc.isenabled(), gc.get_freeze_count(), sys.getswitchinterval(),
         signal.getsignal(signal.SIGXCPU), resource.getrlimit(resource.RLIMIT_RTTIME),
