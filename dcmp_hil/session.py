@@ -136,10 +136,11 @@ class Session:
                 began_ns = self._wall.now_ns()
                 with line.backend:
                     self._run_line()
-        except TripError as trip:
+        except TripError as seen:
+            trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
-            raise
+            raise trip from None
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))

@@ -162,14 +162,15 @@ def test_healthy_rig_leaves_the_watch_room(overrides: tuple[str, ...], peak: flo
 
 def test_watch_judges_by_an_observer_of_its_own() -> None:
     # Whatever the rig's own observer claims, the watch sees only sample and voltage.
-    watch = DisturbanceWatch(SuperTwisting(setting(), mu0=100.0), T, 50.0, 5.4)
+    watch = DisturbanceWatch(SuperTwisting(setting(), mu0=100.0), setting(), 50.0)
 
     def hold_still() -> None:
         for k in range(200):  # 10 V and no motion: w = -54 rad/s2
             watch.check(Sample(k * T, 0.0, 10.0), Estimate(0.0, 0.0, 0.0))
 
-    with pytest.raises(TripError, match="same position"):
+    with pytest.raises(TripError, match="-55 rad") as caught:
         hold_still()
+    assert caught.value.explained().reason == "stuck"
 
 
 @pytest.mark.parametrize(
