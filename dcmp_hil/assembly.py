@@ -10,10 +10,12 @@ from dcmp_hil.backends import open_backend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.limits import Limits
 from dcmp_hil.loop import Line
 from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins import find_named
 from dcmp_hil.predictor import Predictor
@@ -57,13 +59,15 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
         in_line=in_line,
     )
     measured = rig.controller.position == "measured"
+    supervisor = make_supervisor(rig, recorder.event)
     line = Line(
         backend=backend,
+        outliers=make_outliers(rig, supervisor),
         observer=observer,
         predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
         trajectory=trajectory,
         controller=controller,
-        supervisor=make_supervisor(rig, recorder.event),
+        supervisor=supervisor,
         telemetry=recorder,
         overruns=Overruns(rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None),
         clock=clock,
@@ -103,13 +107,13 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
         watch = SuperTwisting(setting, mu0=min(_WATCH_FLOOR, 0.3 / rig.period))
         monitors += [
             Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
-            DisturbanceWatch(watch, rig.period, limits.disturbance_limit_rad_s2, rig.model.ku_rad_s2_V),
+            DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2),
         ]
     immediate = limits.start == "immediate"
     probe = None if immediate or limits.probe == "off" else make_probe(rig)
     return Supervisor(
         monitors,
-        voltage_limit=rig.amplifier.limit,
+        make_limits(rig, notify),
         settle=0.0 if immediate else _SETTLE,
         engage=0.0 if immediate else _ENGAGE,
         notify=notify,
@@ -117,11 +121,34 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
     )
 
 
+def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
+    """Make the clamps on what the line asks for; with `monitors = "finite"` the voltage's alone."""
+    limits, amplifier = rig.supervisor, rig.amplifier
+    if limits.monitors != "all":
+        return Limits(voltage=amplifier.limit, period=rig.period, notify=notify)
+    return Limits(
+        voltage=amplifier.limit,
+        slew=amplifier.slew,
+        position=limits.position_limit_rad,
+        velocity=limits.velocity_limit_rad_s,
+        error=limits.error_limit,
+        period=rig.period,
+        notify=notify,
+    )
+
+
+def make_outliers(rig: Rig, supervisor: Supervisor) -> Outliers:
+    """Make what leaves wrong counts out; with `monitors = "finite"` it leaves none out."""
+    limits = rig.supervisor
+    fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf
+    return Outliers(fastest, rig.period, rig.encoder.count, supervisor.stop_now)
+
+
 def make_probe(rig: Rig) -> Probe | None:
     """Make the probe of a rig; None where its encoder is too coarse to tell."""
-    model, counts = rig.model.values(), rig.encoder.counts
+    model = rig.model.values()
     voltage = min(rig.amplifier.limit, max(_PROBE_V, _OVER_FRICTION * model.f1 / model.ku))
-    probe = Probe(model.ku, voltage, 0.0 if counts is None else math.tau / counts)
+    probe = Probe(model.ku, voltage, rig.encoder.count)
     return probe if probe.telling else None
 
 

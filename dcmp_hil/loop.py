@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.controllers import Controller
     from dcmp_hil.observers import Observer
+    from dcmp_hil.outliers import Outliers
     from dcmp_hil.overruns import Overruns
     from dcmp_hil.predictor import Predictor
     from dcmp_hil.supervisor import Supervisor
@@ -38,6 +39,7 @@ class Line:
     """The stages of a period, in the order in which a sample passes them."""
 
     backend: Backend
+    outliers: Outliers
     observer: Observer
     predictor: Predictor
     trajectory: Trajectory
@@ -77,20 +79,18 @@ def run(line: Line, until: float, stop: Stop) -> float:
     BackendError
         If the device or the way to it fails.
     """
-    backend, trajectory, supervisor, clock, delay = (
-        line.backend, line.trajectory, line.supervisor, line.clock, line.delay,
+    backend, outliers, trajectory, supervisor, clock, delay = (
+        line.backend, line.outliers, line.trajectory, line.supervisor, line.clock, line.delay,
     )  # fmt: skip
     observer, predictor, controller, telemetry, overruns = (
-        line.observer,
-        line.predictor,
-        line.controller,
-        line.telemetry,
-        line.overruns,
-    )
+        line.observer, line.predictor, line.controller, line.telemetry, line.overruns,
+    )  # fmt: skip
     previous, first = math.nan, math.nan
 
     while True:
         sample = backend.read()
+        while outliers.reject(sample):  # as if it had been lost: the device holds its voltage
+            sample = backend.read()
         arrived = clock.now_ns() * 1e-9
         estimate = observer.update(sample)
         if first != first:
@@ -99,7 +99,7 @@ def run(line: Line, until: float, stop: Stop) -> float:
         if supervisor.engages(sample):
             trajectory.begin(sample.t, estimate.position)
         ahead = predictor.ahead(sample, estimate)
-        reference = trajectory.at(sample.t + delay)
+        reference = supervisor.bound(sample, trajectory.at(sample.t + delay))
         demand = controller.update(reference, ahead)
         voltage = supervisor.admit(sample, estimate, demand)
         backend.write(voltage)
@@ -110,6 +110,8 @@ def run(line: Line, until: float, stop: Stop) -> float:
 
         if supervisor.trip is not None:
             raise supervisor.trip
-        overruns.look(timing)
-        if sample.t >= until or stop.requested:
+        late = overruns.look(timing)
+        if late is not None:
+            supervisor.stop_orderly(late, sample.t)
+        elif (sample.t >= until or stop.requested) and not supervisor.stopping:
             return sample.t

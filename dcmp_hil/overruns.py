@@ -43,14 +43,8 @@ class Overruns:
         self._recent = 0  # a bit a period, the newest last
         self._cold = round(_WARM / period)  # periods to go
 
-    def look(self, timing: Timing) -> None:
-        """Take the timing of one period.
-
-        Raises
-        ------
-        DeadlineError
-            If too many were late.
-        """
+    def look(self, timing: Timing) -> DeadlineError | None:
+        """Take the timing of one period; return why the run should end if too many were late."""
         lateness, period = timing.lateness, self._period
         punctual = self._punctual + _LEAK * period
         self._punctual = punctual = min(lateness, punctual)
@@ -62,11 +56,12 @@ class Overruns:
             self.count += late
             self._recent = recent = (self._recent << 1 | late) & _MASK
             if late and self._limit is not None and recent.bit_count() >= self._limit:
-                self._give_up(timing)
+                return self._too_many(timing)
+        return None
 
-    def _give_up(self, timing: Timing) -> None:
+    def _too_many(self, timing: Timing) -> DeadlineError:
         behind = timing.lateness - self._punctual
-        raise DeadlineError(
+        return DeadlineError(
             f"{self._recent.bit_count()} of the last {_WINDOW} periods of {1e6 * self._period:.0f} us were "
             f"late; the last sample by {1e6 * behind:.0f} us, its command took {1e6 * timing.compute:.0f} us."
             " Close other programs, lower loop.rate_hz, see what the summary says was not granted, or set "

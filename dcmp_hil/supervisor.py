@@ -6,15 +6,16 @@ import math
 from enum import Enum, StrEnum, auto
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import TripError
+from dcmp_hil.errors import DcmpError, TripError
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from dcmp_hil.limits import Limits
     from dcmp_hil.monitors import Monitor
     from dcmp_hil.probe import Probe
-    from dcmp_hil.values import Estimate, Sample
+    from dcmp_hil.values import Estimate, Reference, Sample
 
 
 class Phase(StrEnum):
@@ -25,6 +26,7 @@ class Phase(StrEnum):
     SETTLING = "settling"  # 0 V while the observer finds the arm
     ENGAGING = "engaging"  # the trajectory runs, authority grows
     RUNNING = "running"  # full authority
+    STOPPING = "stopping"  # an orderly end: authority shrinks to 0 V
     TRIPPED = "tripped"  # 0 V for good
 
 
@@ -37,23 +39,27 @@ class Cue(Enum):
     SETTLED = auto()
     ENGAGED = auto()
     FAULT = auto()  # a monitor objects, the probe refuses, or the device reports a fault
+    CONCERN = auto()  # something that leaves time for an orderly end
+    STOPPED = auto()
 
 
 TABLE: Mapping[Phase, Mapping[Cue, Phase]] = {
     Phase.ARMING: {
         Cue.ARMED: Phase.PROBING,
         Cue.ARMED_UNPROBED: Phase.SETTLING,
+        Cue.CONCERN: Phase.TRIPPED,
         Cue.FAULT: Phase.TRIPPED,
     },
-    Phase.PROBING: {Cue.PROBED: Phase.SETTLING, Cue.FAULT: Phase.TRIPPED},
-    Phase.SETTLING: {Cue.SETTLED: Phase.ENGAGING, Cue.FAULT: Phase.TRIPPED},
-    Phase.ENGAGING: {Cue.ENGAGED: Phase.RUNNING, Cue.FAULT: Phase.TRIPPED},
-    Phase.RUNNING: {Cue.FAULT: Phase.TRIPPED},
+    Phase.PROBING: {Cue.PROBED: Phase.SETTLING, Cue.CONCERN: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
+    Phase.SETTLING: {Cue.SETTLED: Phase.ENGAGING, Cue.CONCERN: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
+    Phase.ENGAGING: {Cue.ENGAGED: Phase.RUNNING, Cue.CONCERN: Phase.STOPPING, Cue.FAULT: Phase.TRIPPED},
+    Phase.RUNNING: {Cue.CONCERN: Phase.STOPPING, Cue.FAULT: Phase.TRIPPED},
+    Phase.STOPPING: {Cue.STOPPED: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
     Phase.TRIPPED: {},
 }
 """What follows what; a cue that is not listed changes nothing. Nothing leads out of TRIPPED."""
 
-_CLAMP_SAID_EVERY = 1.0  # s
+_STOP = 0.05  # s that an orderly end takes to 0 V
 
 
 class Supervisor:
@@ -62,39 +68,52 @@ class Supervisor:
     Parameters
     ----------
     monitors
-        Checked every period, in this order.
-    voltage_limit
-        V, either way; infinity on a rig that has none.
+        Checked every period, in this order; an objection means 0 V at once.
+    limits
+        Clamps on what the line asks for.
     settle, engage
         s, the lengths of these two phases; 0 and 0 for an immediate start.
     notify
-        Told of every change of phase, and of clamped voltages.
+        Told of every change of phase.
     probe
         None to start without.
+
+    Attributes
+    ----------
+    limits
+        As given.
+    phase
+        Where the run stands.
+    stopping
+        Whether an orderly end is under way: some periods more, and there will be a `trip`.
+    trip
+        Why the run is over; None while it is not.
     """
 
     def __init__(
         self,
         monitors: Sequence[Monitor],
+        limits: Limits,
         *,
-        voltage_limit: float,
         settle: float,
         engage: float,
         notify: Callable[[Event], None],
         probe: Probe | None = None,
     ) -> None:
         self._checks = tuple(monitor.check for monitor in monitors)
-        self._limit = voltage_limit
+        self.limits = limits
         self._settle, self._engage = settle, engage
         self._notify = notify
         self._probe = probe
         self._since = math.nan  # s, device time at which the present phase began
         self._push = 0.0  # V, what the probe wants
-        self.phase = Phase.ARMING
+        self._last = 0.0  # V, what was sent last
+        self._stop_from = 0.0  # V, where an orderly end begins
+        self._cause: DcmpError | None = None
         self._has_authority = False  # in RUNNING; asked every period
-        self.trip: TripError | None = None
-        self.clamped = 0  # periods in which the demand was more than the limit
-        self._clamp_said = -math.inf
+        self.phase = Phase.ARMING
+        self.stopping = False
+        self.trip: DcmpError | None = None
 
     def engages(self, sample: Sample) -> bool:
         """Move on to the phase of this period; True in the first of ENGAGING, when the trajectory starts."""
@@ -109,68 +128,88 @@ class Supervisor:
             return True
         return False
 
+    def bound(self, sample: Sample, reference: Reference) -> Reference:
+        """Return what of the reference the limits allow."""
+        return self.limits.reference(sample, reference)
+
     def admit(self, sample: Sample, estimate: Estimate, demand: float) -> float:
         """Return the voltage to send, V.
 
         Once a monitor has objected, the probe has refused, or the demand was no finite number, it is 0 V for
-        good, and `trip` says why: the loop sends that 0 V, records the period, and ends.
+        good, and `trip` says why: the loop sends that 0 V, records the period, and ends. A limit that has
+        acted for too long takes 50 ms to get there.
         """
         try:
             for check in self._checks:
                 check(sample, estimate)
             _check_finite(sample, demand)
-        except TripError as trip:
-            self._trip(trip, sample.t)
-        limit = self._limit if self._has_authority else self._growing_limit(sample.t)
-        if self.phase is Phase.PROBING:
-            return self._push
-        if -limit <= demand <= limit:
-            return demand
-        if self._has_authority:  # before, the limit is meant to bite
-            self._note_clamp(sample.t, demand, limit)
-        return limit if demand > 0.0 else -limit
+        except TripError as objection:
+            self.stop_now(objection, sample.t)
+        if not self._has_authority:
+            self._end_ramp(sample.t)
+        self._last = voltage = (
+            self.limits.voltage(sample.t, demand, self._last)
+            if self._has_authority
+            else self._partial_voltage(sample.t, demand)
+        )
+        if self.limits.concern is not None:
+            self.stop_orderly(self.limits.concern, sample.t)
+        return voltage
+
+    def stop_now(self, cause: TripError, t: float) -> None:
+        """Go to 0 V in the period of device time `t`, s."""
+        self._cause = self._cause or cause  # the first cause wins
+        self._cue(Cue.FAULT, t)
+
+    def stop_orderly(self, cause: DcmpError, t: float) -> None:
+        """Let authority shrink to 0 V from the period after device time `t` (s) on, then trip."""
+        self._cause = self._cause or cause
+        self._cue(Cue.CONCERN, t)
 
     def _go_on_probing(self, sample: Sample) -> None:
         assert self._probe is not None  # noqa: S101 - the table leads here only with one
         try:
             push = self._probe.voltage_at(sample.t, sample.position)
-        except TripError as trip:
-            self._trip(trip, sample.t)
+        except TripError as refusal:
+            self.stop_now(refusal, sample.t)
             return
         if push is None:
             self._cue(Cue.PROBED, sample.t)
         else:
-            self._push = max(-self._limit, min(self._limit, push))
+            most = self.limits.voltage_limit
+            self._push = max(-most, min(most, push))
 
-    def _trip(self, trip: TripError, t: float) -> None:
-        self.trip = self.trip or trip  # the first cause wins
-        self._cue(Cue.FAULT, t)
-
-    def _note_clamp(self, t: float, demand: float, limit: float) -> None:
-        """Count, and say so at most once a second."""
-        self.clamped += 1
-        if not t - self._clamp_said < _CLAMP_SAID_EVERY:
-            self._clamp_said = t
-            self._notify(
-                Event(t, "WARN", f"voltage limited: {demand:.1f} V asked for, {limit:.1f} V allowed")
-            )
-
-    def _growing_limit(self, t: float) -> float:
-        """Return the authority in every phase but RUNNING, V; full authority ends ENGAGING."""
-        if self.phase is not Phase.ENGAGING:
-            return 0.0
+    def _end_ramp(self, t: float) -> None:
+        """Leave ENGAGING with full authority, STOPPING with none."""
         gone = t - self._since
-        if gone < self._engage:
-            return self._limit * gone / self._engage if gone > 0.0 else 0.0  # the limit may be infinite
-        self._cue(Cue.ENGAGED, t)
-        return self._limit
+        if self.phase is Phase.ENGAGING and not gone < self._engage:
+            self._cue(Cue.ENGAGED, t)
+        elif self.phase is Phase.STOPPING and not gone < _STOP:
+            self._cue(Cue.STOPPED, t)
+
+    def _partial_voltage(self, t: float, demand: float) -> float:
+        """Return the voltage in every phase but RUNNING, V."""
+        if self.phase is Phase.PROBING:
+            return self._push
+        gone, most = t - self._since, 0.0
+        if self.phase is Phase.ENGAGING and gone > 0.0:  # at 0 an infinite limit would give NaN
+            most = self.limits.voltage_limit * gone / self._engage
+        elif self.phase is Phase.STOPPING:
+            most = self._stop_from * (1.0 - gone / _STOP)
+        if not most > 0.0:
+            return 0.0
+        return self.limits.slewed(max(-most, min(most, demand)), self._last)
 
     def _cue(self, cue: Cue, t: float) -> None:
         following = TABLE[self.phase].get(cue)
-        if following is not None:
-            self.phase, self._since = following, t
-            self._has_authority = following is Phase.RUNNING
-            self._notify(Event(t, "PHASE", following.value))
+        if following is None:
+            return
+        self.phase, self._since = following, t
+        self._has_authority = following is Phase.RUNNING
+        self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
+        if following is Phase.TRIPPED:
+            self.trip = self._cause
+        self._notify(Event(t, "PHASE", following.value))
 
 
 def _check_finite(sample: Sample, demand: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from dcmp_hil import loop, run
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import TripError
+from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench
@@ -35,6 +37,7 @@ class _Stages:
 
         class Stage:
             trip = property(lambda _: self.trip)
+            stopping = False
 
             def __getattr__(self, name: str) -> Callable[..., Any]:
                 def call(*arguments: Any) -> Any:
@@ -66,13 +69,20 @@ class _Stages:
 
         return loop.Line(
             backend=self.stage({"read": self.read, "write": lambda _: None}),
+            outliers=Outliers(math.inf, 1e-3, 0.0, lambda _, __: None),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
             predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
             trajectory=self.stage(
                 {"at": lambda t: Reference(t, 0.0, 0.0), "hold": lambda _: None, "begin": lambda _, __: None}
             ),
             controller=self.stage({"update": works}),
-            supervisor=self.stage({"engages": lambda _: self._tick == 1, "admit": self.admit}),
+            supervisor=self.stage(
+                {
+                    "engages": lambda _: self._tick == 1,
+                    "bound": lambda _, reference: reference,
+                    "admit": self.admit,
+                }
+            ),
             telemetry=self.stage({"record": lambda _: None}),
             overruns=Overruns(1e-3),
             clock=clock,
@@ -100,7 +110,8 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     second = stages.calls[[name for name, _ in stages.calls].index("record") + 1 :]
     names = [name for name, _ in second]
     assert names == [
-        "read", "update", "engages", "begin", "ahead", "at", "update", "admit", "write", "sent", "record",
+        "read", "update", "engages", "begin", "ahead", "at", "bound", "update", "admit", "write", "sent",
+        "record",
     ]  # fmt: skip
     given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
     sample, estimate = _SAMPLES[1], Estimate(0.25, 0.0, 0.0)
@@ -109,10 +120,11 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     assert given[3] == (sample.t, 0.25)  # the trajectory starts at this sample, from the estimate
     assert given[4] == (sample, estimate)
     assert given[5] == (sample.t + 0.001,)  # when the command takes effect
-    assert given[6] == (reference, ahead)  # the controller sees the state ahead, the monitors the present
-    assert given[7] == (sample, estimate, 5.0)
-    assert given[8] == given[9] == (6.0,)
-    cycle: Cycle = given[10][0]
+    assert given[6] == (sample, reference)
+    assert given[7] == (reference, ahead)  # the controller sees the state ahead, the monitors the present
+    assert given[8] == (sample, estimate, 5.0)
+    assert given[9] == given[10] == (6.0,)
+    cycle: Cycle = given[11][0]
     assert cycle[:5] == (sample, estimate, reference, 5.0, 6.0)
 
 

@@ -51,10 +51,11 @@ def test_overruns_end_the_run_at_their_limit_of_twenty(timing: Timing) -> None:
             overruns.look(_ON_TIME)
     overruns.look(timing)
     assert overruns.count == 25
-    with pytest.raises(DeadlineError, match=r"5 of the last 20 periods of 1000 us were late") as caught:
-        overruns.look(timing)
-    assert caught.value.exit_code == 5
-    assert "timing.overrun" in str(caught.value)
+    concern = overruns.look(timing)
+    assert concern is not None
+    assert concern.exit_code == 5
+    assert "5 of the last 20 periods of 1000 us were late" in str(concern)
+    assert "timing.overrun" in str(concern)
 
 
 def test_overruns_end_nothing_while_everything_is_cold() -> None:
@@ -63,8 +64,7 @@ def test_overruns_end_nothing_while_everything_is_cold() -> None:
         overruns.look(_SLOW)
     overruns.look(_ON_TIME)
     assert overruns.count == 100
-    with pytest.raises(DeadlineError):
-        overruns.look(_SLOW)
+    assert overruns.look(_SLOW) is not None
 
 
 def test_overruns_only_count_when_there_is_no_limit() -> None:
@@ -85,8 +85,7 @@ def test_overruns_forgive_a_device_whose_clock_is_off(ppm: float) -> None:
 def test_overruns_see_lateness_when_the_first_sample_was_late_itself() -> None:
     overruns = _warm(1)
     overruns.look(Timing(T, -0.8 * T, 20e-6))
-    with pytest.raises(DeadlineError):
-        overruns.look(Timing(T, 0.0, 20e-6))
+    assert overruns.look(Timing(T, 0.0, 20e-6)) is not None
 
 
 class _Busy(SimBackend):
@@ -107,11 +106,11 @@ def test_run_ends_at_zero_volts_when_periods_are_late_and_the_rig_says_stop() ->
     held = HeldRun("timing.overrun=stop", "timing.overrun_limit=7", base=_Busy)
     with pytest.raises(DeadlineError):
         held.run()
-    assert held.reads == 107
+    assert held.reads == 108  # one more: the supervisor's 0 V, as the arm is at rest yet
     assert not held.backend.live
     result = held.session.result()
     assert result.overruns == 7
-    assert result.summary.periods == 107
+    assert result.summary.periods == 108
     assert [event.level for event in result.events[-2:]] == ["ERROR", "INFO"]
     assert result.events[-1].text == "amplifier at 0 V"
 

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcmp_hil.errors import TripError
+from dcmp_hil.limits import Limits
 from dcmp_hil.supervisor import Phase, Supervisor
-from dcmp_hil.values import Estimate, Event, Sample
+from dcmp_hil.values import Estimate, Event, Reference, Sample
 
 _AT_REST = Estimate(0.0, 0.0, 0.0)
 _PERIOD = 1.0 / 1024.0  # s, exact in binary: phases change at the very period
@@ -26,11 +27,21 @@ class _Objects:
 
 
 def _supervisor(
-    *monitors: _Objects, limit: float = 10.0, settle: float = 0.25, engage: float = 0.25
+    *monitors: _Objects,
+    limit: float = 10.0,
+    settle: float = 0.25,
+    engage: float = 0.25,
+    slew: float = math.inf,
 ) -> tuple[Supervisor, list[Event]]:
     events: list[Event] = []
-    made = Supervisor(monitors, voltage_limit=limit, settle=settle, engage=engage, notify=events.append)
+    limits = Limits(voltage=limit, slew=slew, period=_PERIOD, notify=events.append)
+    made = Supervisor(monitors, limits, settle=settle, engage=engage, notify=events.append)
     return made, events
+
+
+def _reason(supervisor: Supervisor) -> str:
+    assert isinstance(supervisor.trip, TripError)
+    return supervisor.trip.reason
 
 
 def _period(supervisor: Supervisor, t: float, demand: float) -> tuple[bool, float]:
@@ -78,31 +89,31 @@ def test_supervisor_never_lets_more_than_the_limit_through(limit: float, demand:
     supervisor, _ = _supervisor(limit=limit, settle=0.0, engage=0.0)
     _, voltage = _period(supervisor, 0.0, demand)
     assert voltage == max(-limit, min(limit, demand))
-    assert supervisor.clamped == (abs(demand) > limit)
+    assert supervisor.limits.clamped == (abs(demand) > limit)
 
 
 @pytest.mark.parametrize("demand", [10.0, -10.0])
 def test_supervisor_does_not_call_the_limit_itself_clamped(demand: float) -> None:
     supervisor, events = _supervisor(settle=0.0, engage=0.0)
     assert _period(supervisor, 0.0, demand)[1] == demand
-    assert supervisor.clamped == 0
+    assert supervisor.limits.clamped == 0
     assert not [event for event in events if event.level == "WARN"]
 
 
 def test_supervisor_says_it_once_a_second_when_it_clamps() -> None:
     supervisor, events = _supervisor(settle=0.0, engage=0.0)
     for k in range(3 * 1024):
-        _period(supervisor, k * _PERIOD, 11.0)
+        _period(supervisor, k * _PERIOD, 11.0 if k % 256 > 3 else 0.0)  # in a row it would end the run
     warnings = [event.t for event in events if event.level == "WARN"]
-    assert warnings == [0.0, 1.0, 2.0]
-    assert supervisor.clamped == 3 * 1024
+    assert warnings == [4 * _PERIOD, 1.0 + 4 * _PERIOD, 2.0 + 4 * _PERIOD]
+    assert supervisor.limits.clamped == 3 * (1024 - 16)
 
 
 def test_supervisor_is_silent_when_the_growing_limit_bites() -> None:
     supervisor, events = _supervisor()
     for k in range(512):
         _period(supervisor, k * _PERIOD, 1.0)
-    assert supervisor.clamped == 0
+    assert supervisor.limits.clamped == 0
     assert {event.level for event in events} == {"PHASE"}
 
 
@@ -128,8 +139,7 @@ def test_supervisor_keeps_the_first_cause() -> None:
     supervisor, _ = _supervisor(_Objects(1.0, "second"), _Objects(0.5, "first"), settle=0.0, engage=0.0)
     for t in (0.4, 0.6, 1.2):
         _period(supervisor, t, math.nan if t > 1.0 else 1.0)
-    assert supervisor.trip is not None
-    assert supervisor.trip.reason == "first"
+    assert _reason(supervisor) == "first"
 
 
 @pytest.mark.parametrize("demand", [math.nan, math.inf, -math.inf])
@@ -137,8 +147,7 @@ def test_supervisor_keeps_the_first_cause() -> None:
 def test_supervisor_trips_when_the_demand_is_not_finite(demand: float, settle: float) -> None:
     supervisor, _ = _supervisor(settle=settle)
     assert _period(supervisor, 0.0, demand)[1] == 0.0
-    assert supervisor.trip is not None
-    assert supervisor.trip.reason == "not_finite"
+    assert _reason(supervisor) == "not_finite"
 
 
 def test_supervisor_trips_while_it_settles_too() -> None:
@@ -146,3 +155,105 @@ def test_supervisor_trips_while_it_settles_too() -> None:
     for t in (0.0, 0.1):
         _period(supervisor, t, 0.0)
     assert supervisor.trip is not None
+
+
+def _reasons_of(supervisor: Supervisor, demand: float, seconds: float) -> list[tuple[float, float]]:
+    """Run periods until it trips; return device times and voltages."""
+    seen: list[tuple[float, float]] = []
+    while supervisor.trip is None and len(seen) < seconds / _PERIOD:
+        t = len(seen) * _PERIOD
+        seen.append((t, _period(supervisor, t, demand)[1]))
+    return seen
+
+
+def test_supervisor_ends_in_an_orderly_way_when_the_voltage_is_limited_for_half_a_second() -> None:
+    # P03: 500 ms saturated: A1, that is to 0 V within 50 ms
+    supervisor, events = _supervisor(settle=0.0, engage=0.0)
+    seen = _reasons_of(supervisor, 11.0, 2.0)
+    assert _reason(supervisor) == "saturation"
+    assert abs(seen[-1][0] - 0.55) <= 2 * _PERIOD
+    assert seen[-1][1] == 0.0
+    ramp = [voltage for t, voltage in seen if t >= 0.5]
+    assert ramp == pytest.approx([10.0 * (1.0 - k * _PERIOD / 0.05) for k in range(len(ramp) - 1)] + [0.0])
+    assert [event.text for event in events if event.level == "PHASE"][-2:] == ["stopping", "tripped"]
+
+
+def test_supervisor_goes_to_zero_at_once_when_a_fault_comes_into_an_orderly_end() -> None:
+    supervisor, _ = _supervisor(_Objects(0.52), settle=0.0, engage=0.0)
+    seen = _reasons_of(supervisor, 11.0, 2.0)
+    assert seen[-1][0] == pytest.approx(0.52, abs=_PERIOD)
+    assert seen[-2][1] > 5.0
+    assert seen[-1][1] == 0.0
+    assert _reason(supervisor) == "saturation"  # the first cause wins
+
+
+@pytest.mark.parametrize("demand", [0.0, 3.0, -3.0, 20.0])
+def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: float) -> None:
+    supervisor, _ = _supervisor(settle=0.0, engage=0.0)
+    assert _period(supervisor, 0.0, -6.0)[1] == -6.0
+    supervisor.stop_orderly(TripError("late", "Seen.", "Look."), 0.0)
+    assert supervisor.stopping
+    for k in range(1, 60):
+        most = 6.0 * max(0.0, 1.0 - (k * _PERIOD) / 0.05)
+        assert _period(supervisor, k * _PERIOD, demand)[1] == pytest.approx(max(-most, min(most, demand)))
+    assert _reason(supervisor) == "late"
+    assert not supervisor.stopping
+
+
+def test_supervisor_trips_at_once_when_an_orderly_end_is_asked_for_without_authority() -> None:
+    supervisor, _ = _supervisor()
+    _period(supervisor, 0.0, 1.0)
+    supervisor.stop_orderly(TripError("late", "Seen.", "Look."), 0.0)
+    assert _reason(supervisor) == "late"
+
+
+def test_supervisor_limits_the_slew_in_every_phase() -> None:
+    supervisor, events = _supervisor(slew=100.0)
+    last = 0.0
+    for k in range(1024):
+        voltage = _period(supervisor, k * _PERIOD, 9.0 if k % 200 < 100 else -9.0)[1]
+        assert abs(voltage - last) <= 100.0 * _PERIOD + 1e-12
+        last = voltage
+    said = [event.text for event in events if event.level == "WARN"]
+    assert said
+    assert said[0].startswith("slew limited")
+
+
+def _bound(limits: Limits, reference: Reference, t: float = 0.0, position: float = 0.0) -> Reference:
+    return limits.reference(Sample(t, position, 0.0), reference)
+
+
+def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None:
+    events: list[Event] = []
+    limits = Limits(voltage=10.0, period=_PERIOD, notify=events.append, position=2.0, velocity=10.0)
+    inside = Reference(1.9, -9.5, 40.0)
+    assert _bound(limits, inside) is inside
+    assert not events
+    assert _bound(limits, Reference(-2.5, -1.0, 3.0)) == Reference(-1.9, 0.0, 0.0)
+    assert _bound(limits, Reference(1.0, 12.0, 3.0)) == Reference(1.0, 9.5, 0.0)
+    assert [event.text for event in events] == [
+        "reference limited to 1.9 rad: it asks for -2.5",
+        "reference's velocity limited to 9.5 rad/s: it asks for 12",
+    ]
+    _bound(limits, Reference(2.5, 1.0, 3.0), t=0.9)
+    assert len(events) == 2  # once a second
+
+
+@pytest.mark.parametrize("field", ["position", "velocity"])
+def test_limits_leave_nan_in_the_reference_for_the_demand_to_show(field: str) -> None:
+    limits = Limits(
+        voltage=10.0, period=_PERIOD, notify=lambda _: None, position=2.0, velocity=10.0, error=1.0
+    )
+    assert math.isnan(getattr(_bound(limits, Reference(0.0, 0.0, 0.0)._replace(**{field: math.nan})), field))
+
+
+def test_limits_want_an_end_when_the_arm_stays_off_the_reference() -> None:
+    limits = Limits(voltage=10.0, period=_PERIOD, notify=lambda _: None, error=0.5)
+    for k in range(200):  # less than half a second, again and again
+        for late in range(100):
+            _bound(limits, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)
+    assert not limits.concern
+    for late in range(513):
+        _bound(limits, Reference(-0.6, 0.0, 0.0), t=1e3 + late * _PERIOD)
+    assert limits.concern is not None
+    assert limits.concern.reason == "tracking"

@@ -12,7 +12,9 @@ from dcmp_hil.supervisor import TABLE, Cue, Phase
 Table = dict[Phase, dict[Cue, Phase]]
 Path = tuple[Phase, ...]
 
-ORDER = [Phase.ARMING, Phase.PROBING, Phase.SETTLING, Phase.ENGAGING, Phase.RUNNING]
+ORDER = [
+    Phase.ARMING, Phase.PROBING, Phase.SETTLING, Phase.ENGAGING, Phase.RUNNING, Phase.STOPPING,
+]  # fmt: skip
 
 
 def table() -> Table:
@@ -45,6 +47,18 @@ def violations(of: Table) -> list[str]:
         for phase in Phase
         if phase is not Phase.TRIPPED and of[phase].get(Cue.FAULT) is not Phase.TRIPPED
     ]
+    wrong += [
+        f"a concern does not end {phase}"
+        for phase in ORDER[:-1]
+        if of[phase].get(Cue.CONCERN) not in (Phase.STOPPING, Phase.TRIPPED)
+    ]
+    if set(of[Phase.STOPPING].values()) != {Phase.TRIPPED}:
+        wrong.append("STOPPING leads elsewhere than to TRIPPED")
+    wrong += [
+        f"{phase} has no voltage to shrink"
+        for phase in Phase
+        if Phase.STOPPING in of[phase].values() and phase not in (Phase.ENGAGING, Phase.RUNNING)
+    ]
     for path in every:
         steps = [phase for phase in path if phase is not Phase.TRIPPED]
         places = [ORDER.index(phase) for phase in steps]
@@ -73,6 +87,9 @@ SEEDED = {
     "no ramp": (Phase.SETTLING, Cue.SETTLED, Phase.RUNNING),
     "a fault that only starts again": (Phase.ENGAGING, Cue.FAULT, Phase.SETTLING),
     "back to the probe": (Phase.RUNNING, Cue.SETTLED, Phase.PROBING),
+    "a concern that is forgotten": (Phase.STOPPING, Cue.STOPPED, Phase.RUNNING),
+    "a concern that only starts again": (Phase.ENGAGING, Cue.CONCERN, Phase.SETTLING),
+    "an orderly end without authority": (Phase.PROBING, Cue.CONCERN, Phase.STOPPING),
 }
 
 

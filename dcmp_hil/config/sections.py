@@ -36,6 +36,11 @@ class EncoderSection(Section):
         """Counts a revolution; None for an ideal encoder."""
         return None if self.counts_per_rev == "ideal" else float(self.counts_per_rev)
 
+    @property
+    def count(self) -> float:
+        """One count, rad; 0 for an ideal encoder."""
+        return 0.0 if self.counts is None else math.tau / self.counts
+
 
 class AmplifierSection(Section):
     """`[amplifier]`: what the amplifier may put out."""
@@ -123,11 +128,18 @@ class SupervisorSection(Section):
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only (simulation only)."""
     velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0
-    """Trip above this estimated velocity, rad/s."""
+    """Trip above this estimated velocity, rad/s. The reference is held 5 % short of it."""
     position_limit_rad: Annotated[float, Field(ge=0.01, le=10_000)] = 6.2832
-    """Trip beyond this position either way, rad."""
+    """Trip beyond this position either way, rad. The reference is held 5 % short of it."""
+    error_limit_rad: Annotated[float, Field(ge=0.001, le=10_000)] | Literal["none"] = 1.5
+    """End the run when the arm was further off the reference than this for 0.5 s, rad; "none" for never."""
     disturbance_limit_rad_s2: Annotated[float, Field(ge=0.01, le=1e6)] = 50.0
     """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
+
+    @property
+    def error_limit(self) -> float:
+        """Largest distance from the reference, rad; infinity for none."""
+        return math.inf if self.error_limit_rad == "none" else float(self.error_limit_rad)
 
 
 class TimingSection(Section):

@@ -79,7 +79,8 @@ def judge_plain(row: Row, seed: int) -> Verdict:
     outcome = outcome_of(session)
     columns, at = session.result().columns, bench.plan.faults[0].at
     begins = at if isinstance(at, float) else 0.0
-    end = float(np.nanmax(columns["time_s"])) if len(columns) else 0.0
+    times = columns["time_s"][np.isfinite(columns["time_s"])] if len(columns) else ()
+    end = max(times, default=0.0)
     found = [*bench.oracle.violations]
     reaction = math.nan if row.bound_ms is None else 1e3 * (end - begins)
     if row.bound_ms is not None and not reaction <= row.bound_ms:

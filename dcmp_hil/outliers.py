@@ -1,0 +1,84 @@
+"""Positions that no arm can have reached: one counts as a lost sample, three end the run."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING
+
+from dcmp_hil.errors import TripError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.values import Sample
+
+_FACTOR = 4.0  # times the velocity limit: below, the limit itself is to act
+_FLOOR = 8.0  # counts: noise and the encoder's step at high rates
+_MANY, _WITHIN = 3, 100  # outliers, samples
+
+
+class Outliers:
+    """Finds encoder counts that are wrong for a moment.
+
+    Parameters
+    ----------
+    velocity_limit
+        rad/s; infinity finds none.
+    period
+        s, nominal.
+    count
+        rad, one count of the encoder; 0 for an ideal one.
+    stop
+        Called with what is wrong and when (s, device time), once there were too many.
+
+    Attributes
+    ----------
+    count
+        Samples left out so far.
+    """
+
+    def __init__(
+        self,
+        velocity_limit: float,
+        period: float,
+        count: float,
+        stop: Callable[[TripError, float], None],
+    ) -> None:
+        self._speed, self._floor = _FACTOR * velocity_limit, _FLOOR * count
+        self._usual = max(self._speed * period, self._floor)  # rad, from one sample to the next
+        self._stop = stop
+        self._x = self._t = math.nan
+        self._samples = 0
+        self._found: deque[int] = deque(maxlen=_MANY)
+        self.count = 0
+
+    def reject(self, sample: Sample) -> bool:
+        """Return whether to read on: this sample's position is off, and may be left out."""
+        self._samples += 1
+        if -self._usual <= sample.position - self._x <= self._usual:
+            self._t, self._x, _, _ = sample
+            return False
+        return self._is_off(sample)
+
+    def _is_off(self, sample: Sample) -> bool:
+        moved = abs(sample.position - self._x)
+        allowed = max(self._speed * (sample.t - self._t), self._floor)
+        # The first sample, and what is no number, are for others to judge; a device's fault goes first.
+        if not allowed < moved < math.inf or sample.fault:
+            self._t, self._x, _, _ = sample
+            return False
+        self._found.append(self._samples)
+        if len(self._found) < _MANY or self._samples - self._found[0] >= _WITHIN:
+            self.count += 1
+            return True
+        self._stop(
+            TripError(
+                "jump",
+                f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
+                f"third jump within {_WITHIN} samples.",
+                "Look at the encoder's cable, screen and coupling.",
+            ),
+            sample.t,
+        )
+        return False
