@@ -104,6 +104,11 @@ class BoardLink:
         """What arrived so far and was no frame."""
         return self._receiver.corrupt if self._receiver else 0
 
+    @property
+    def pending(self) -> bool:
+        """Whether the board sent more in its last period than was looked at."""
+        return bool(self._frames)
+
     def open(self) -> None:
         """Start the pace."""
         self._pace.start()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import gc
-import math
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,11 +19,12 @@ import numpy as np
 
 from dcmp_hil import load_rig, loop
 from dcmp_hil.assembly import assemble
-from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.session import Session
+from dcmp_hil.wire import cobs
 from sim_backend.backend import SimBackend
 from sim_backend.board import Board
-from sim_backend.sim_board import SimBoardBackend
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.recorder import Sink
+    from dcmp_hil.wire.frame import Frame
 
 _SPREAD = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
 _PRIORITY = 80
@@ -200,34 +202,42 @@ def _recording(rig: Rig, file: Path) -> Sink:
 # ---------------------------------------------------------------- what a period costs
 
 
-class _Stopwatch:
-    """A board whose own time is taken out of each period's."""
+class _Wire:
+    """A link to a board in this process; whatever the board does is taken out of each period's time."""
+
+    name = "wire"
+    pending = False
+    corrupt = 0
 
     def __init__(self, board: Board) -> None:
-        self._board = board
-        self._mark, self._inside = math.nan, 0.0
+        self._board, self._receiver = board, cobs.Receiver()
+        self._frames: deque[Frame] = deque()
+        self._mark = self._inside = 0.0
         self.periods: list[float] = []  # s, the host's part
-        self.truth = board.truth
 
-    def tick(self) -> None:
-        """End a period and begin the next."""
-        now = time.perf_counter()
-        self.periods.append(now - self._mark - self._inside)
-        self._board.tick()
-        self._mark, self._inside = time.perf_counter(), 0.0
+    def open(self) -> None:
+        """Do nothing."""
 
-    def receive(self, data: bytes) -> None:
-        """Hand bytes to the firmware."""
+    def close(self) -> None:
+        """Do nothing."""
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame's bytes to the board."""
+        data = cobs.encode(frame)
         began = time.perf_counter()
         self._board.receive(data)
         self._inside += time.perf_counter() - began
 
-    def transmit(self) -> bytes:
-        """Take bytes from the firmware."""
-        began = time.perf_counter()
-        data = self._board.transmit()
-        self._inside += time.perf_counter() - began
-        return data
+    def receive(self, timeout: float) -> Frame | None:
+        """End a period, let the board tick, and begin the next with what it sent."""
+        if timeout > 0.0 and not self._frames:
+            now = time.perf_counter()
+            self.periods.append(now - self._mark - self._inside)
+            self._board.tick()
+            data = self._board.transmit()
+            self._mark, self._inside = time.perf_counter(), 0.0
+            self._frames.extend(self._receiver.feed(data))
+        return self._frames.popleft() if self._frames else None
 
 
 class _Nobody:
@@ -237,18 +247,18 @@ class _Nobody:
 def period_us(seconds: float = 10.0) -> float:
     """Return the median cost of a period on the host, from the SAMPLE's bytes to the DRIVE's, and its record.
 
-    Virtual time, COBS, no garbage collection, as in real time; the firmware's C and the plant are taken
-    out, the stopwatch itself (0.6 us) is not.
+    Everything that a run on a serial port does but the system calls; no garbage collection, as in real time.
+    The firmware's C and the plant are taken out, the stopwatch itself (0.3 us) is not.
     """
-    rig, clock = load_rig("bench-1khz", ["backend.kind=sim-board"]), SimulatedClock()
-    board = _Stopwatch(Board(rig, carrier="cobs"))
+    rig, clock = load_rig("bench-1khz", ["backend.kind=sim-board"]), MonotonicClock()
+    wire = _Wire(Board(rig, carrier="cobs"))
     line, _ = assemble(rig, clock, [], in_line=True)
-    line = replace(line, backend=SimBoardBackend(rig, clock, board))  # type: ignore[arg-type]
+    line = replace(line, backend=DeviceBackend(rig, wire, clock))
     with line.backend:
-        handshake = len(board.periods)
+        handshake = len(wire.periods)
         gc.disable()
         try:
             loop.run(line, seconds, _Nobody())
         finally:
             gc.enable()
-        return 1e6 * statistics.median(board.periods[handshake + 1000 :])
+        return 1e6 * statistics.median(wire.periods[handshake + 1000 :])

@@ -74,6 +74,11 @@ class CanLink:
         """What arrived so far and was no frame; most interfaces keep that to themselves."""
         return self._bus.corrupt if isinstance(self._bus, SlcanBus) else self._corrupt
 
+    @property
+    def pending(self) -> bool:
+        """Whether to look again: interfaces hand frames out one by one."""
+        return True
+
     def open(self) -> None:
         """Open the interface.
 

@@ -22,6 +22,11 @@ class Link(Protocol):
         """What arrived so far and was no frame."""
         ...
 
+    @property
+    def pending(self) -> bool:
+        """Whether more may be there than what `receive` returned last; never False where there is."""
+        ...
+
     def open(self) -> None:
         """Open it, alone."""
         ...

@@ -58,11 +58,17 @@ class SerialLink:
         self._poll = select.poll()
         self._receiver = cobs.Receiver()
         self._frames: deque[Frame] = deque()
+        self._more = True
 
     @property
     def corrupt(self) -> int:
         """What arrived so far and was no frame."""
         return self._receiver.corrupt
+
+    @property
+    def pending(self) -> bool:
+        """Whether more was there when the port was read last."""
+        return self._more or bool(self._frames)
 
     def open(self) -> None:
         """Open the port, exclusively, in low-latency mode where there is one.
@@ -111,14 +117,18 @@ class SerialLink:
         """
         frames = self._frames
         if frames:
+            self._more = True  # since these were read
             return frames.popleft()
         port = self._opened()
         try:
             if not self._poll.poll(1e3 * timeout):
+                self._more = False
                 return None
-            frames.extend(self._receiver.feed(port.read(_CHUNK)))
+            data = port.read(_CHUNK)
         except FAILURES as error:
             raise self._broken(error) from error
+        self._more = len(data) == _CHUNK
+        frames.extend(self._receiver.feed(data))
         return frames.popleft() if frames else None
 
     def _write(self, data: bytes) -> None:
