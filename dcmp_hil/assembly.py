@@ -126,11 +126,12 @@ def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
     limits, amplifier = rig.supervisor, rig.amplifier
     if limits.monitors != "all":
         return Limits(voltage=amplifier.limit, period=rig.period, notify=notify)
+    position, velocity = limits.reference_limits
     return Limits(
         voltage=amplifier.limit,
         slew=amplifier.slew,
-        position=limits.position_limit_rad,
-        velocity=limits.velocity_limit_rad_s,
+        position=position,
+        velocity=velocity,
         error=limits.error_limit,
         period=rig.period,
         notify=notify,

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample
 
 _SAID_EVERY = 1.0  # s, each limit
-_INSIDE = 0.95  # of the travel limit: room for the arm to overshoot a reference that stops there
 _SATURATED = 0.5  # s in a row at a limit of the voltage that end the run
 _ASTRAY = 0.5  # s in a row that the arm may be too far from the reference: a step takes less
 _IN_A_ROW = 2.5  # periods between two at most
@@ -45,7 +44,7 @@ class Limits:
     slew
         V/s.
     position, velocity
-        rad and rad/s, either way: where the supervisor would trip. The reference stops 5 % short of them.
+        rad and rad/s, either way, for the reference: short of where the supervisor would trip.
     error
         rad, by which the measured position may be off the reference for half a second.
     period
@@ -75,7 +74,7 @@ class Limits:
         error: float = math.inf,
     ) -> None:
         self.voltage_limit, self._step = voltage, slew * period
-        self._x, self._v, self._error = _INSIDE * position, _INSIDE * velocity, error
+        self._x, self._v, self._error = position, velocity, error
         self._notify = notify
         self.concern: TripError | None = None
         self._slews = slew < math.inf

@@ -55,6 +55,8 @@ class Result:
         What is known of the computer; see `host_facts`.
     overruns
         Late periods of the whole run, by what `timing.overrun` calls late.
+    outliers
+        Samples left out because no arm can have been where they say.
     """
 
     rig: Rig
@@ -66,6 +68,7 @@ class Result:
     grants: tuple[Grant, ...] = ()
     host: dict[str, Any] = field(default_factory=dict)
     overruns: int = 0
+    outliers: int = 0
 
 
 class Session:
@@ -178,6 +181,7 @@ class Session:
             grants=tuple(self._realtime.grants) if self._realtime else (),
             host=self._host,
             overruns=self._line.overruns.count,
+            outliers=self._line.outliers.count,
         )
 
 

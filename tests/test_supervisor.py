@@ -225,7 +225,7 @@ def _bound(limits: Limits, reference: Reference, t: float = 0.0, position: float
 
 def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None:
     events: list[Event] = []
-    limits = Limits(voltage=10.0, period=_PERIOD, notify=events.append, position=2.0, velocity=10.0)
+    limits = Limits(voltage=10.0, period=_PERIOD, notify=events.append, position=1.9, velocity=9.5)
     inside = Reference(1.9, -9.5, 40.0)
     assert _bound(limits, inside) is inside
     assert not events
@@ -242,7 +242,7 @@ def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None
 @pytest.mark.parametrize("field", ["position", "velocity"])
 def test_limits_leave_nan_in_the_reference_for_the_demand_to_show(field: str) -> None:
     limits = Limits(
-        voltage=10.0, period=_PERIOD, notify=lambda _: None, position=2.0, velocity=10.0, error=1.0
+        voltage=10.0, period=_PERIOD, notify=lambda _: None, position=1.9, velocity=9.5, error=1.0
     )
     assert math.isnan(getattr(_bound(limits, Reference(0.0, 0.0, 0.0)._replace(**{field: math.nan})), field))
 

@@ -135,6 +135,7 @@ def _conclude(
         "dropped_periods": result.dropped,
         "link": None if result.link is None else asdict(result.link),
         "overruns": result.overruns,
+        "outliers": result.outliers,
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
         "host": result.host,
     }

@@ -43,6 +43,8 @@ def _figures(result: Result) -> Table:
         link = result.link
         others = f"{link.stale} late or twice, {link.skipped} skipped, {link.corrupt} damaged"
         table.add_row("samples lost", str(link.lost), others)
+    if result.outliers:
+        table.add_row("[yellow]wrong counts", str(result.outliers), "samples left out, as if they were lost")
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table

@@ -130,10 +130,10 @@ def _soft_start(rig: Rig) -> str:
 
 
 def _reach(rig: Rig) -> str:
-    limit = rig.supervisor.position_limit_rad
+    limit, _ = rig.supervisor.reference_limits
     if rig.supervisor.monitors == "finite" or _farthest(rig) <= limit:
         return ""
-    return f"reference: it leaves supervisor.position_limit_rad = {limit:g} and will trip."
+    return f"reference: it leaves supervisor.position_limit_rad and will be held at {limit:.4g} rad."
 
 
 def _farthest(rig: Rig) -> float:

@@ -10,6 +10,8 @@ from pydantic import Field
 from dcmp_hil.model import Model
 from dcmp_hil.section import Section
 
+_SHORT_OF = 0.95  # of a limit that trips: room for the arm to overshoot a reference that stops there
+
 
 class LoopSection(Section):
     """`[loop]`: how often, and how late a command acts."""
@@ -135,6 +137,11 @@ class SupervisorSection(Section):
     """End the run when the arm was further off the reference than this for 0.5 s, rad; "none" for never."""
     disturbance_limit_rad_s2: Annotated[float, Field(ge=0.01, le=1e6)] = 50.0
     """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
+
+    @property
+    def reference_limits(self) -> tuple[float, float]:
+        """Farthest position and largest velocity that a reference is let ask for, rad and rad/s."""
+        return _SHORT_OF * self.position_limit_rad, _SHORT_OF * self.velocity_limit_rad_s
 
     @property
     def error_limit(self) -> float:

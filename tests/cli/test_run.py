@@ -17,7 +17,7 @@ PROMISED = {
     *("tracking_rms_rad", "tracking_max_rad", "velocity_error_rms_rad_s", "velocity_error_max_rad_s"),
     *("disturbance_error_rms_rad_s2", "voltage_peak_V", "voltage_tv_V_s", "periods", "late_periods"),
     *("period_us", "lateness_us", "compute_us", "rate_error_ppm", "realtime_factor", "window_s"),
-    *("overruns", "realtime", "host"),
+    *("overruns", "outliers", "realtime", "host"),
 }
 
 
