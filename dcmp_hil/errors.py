@@ -75,6 +75,7 @@ class TripError(DcmpError):
         self.sentence = sentence
         self.remedy = remedy
         self.cycles: Sequence[Cycle] = ()  # the last second, filled in by the loop
+        self.orderly = False  # the voltage was led to 0 V before: the device has no fault to keep
 
     def explained(self) -> TripError:
         """Return it with its likely cause, which may take milliseconds to find."""

@@ -209,6 +209,8 @@ class Supervisor:
         self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
         if following is Phase.TRIPPED:
             self.trip = self._cause
+            if cue is Cue.STOPPED and isinstance(self._cause, TripError):
+                self._cause.orderly = True
         self._notify(Event(t, "PHASE", following.value))
 
 

@@ -113,7 +113,7 @@ class DeviceBackend:
     ) -> None:
         """Drive 0 V, disarm, wait for the echo, give the device back, close.
 
-        After a trip it is STOP, which the device keeps as a fault.
+        After a trip that left no time for a ramp it is STOP, which the device keeps as a fault.
 
         Raises
         ------
@@ -265,7 +265,7 @@ class DeviceBackend:
             if not self._forgotten:
                 caller.say(Stop(StopReason.NO_SAMPLE))
             return
-        if isinstance(error, TripError):
+        if isinstance(error, TripError) and not error.orderly:
             caller.say(Stop(StopReason.SUPERVISOR))
         goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms)
         if not goodbye.run(answered=self._answered == self._tick):
