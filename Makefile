@@ -20,7 +20,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest bench lock clean
+.PHONY: help run test check pytest faults bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -45,6 +45,11 @@ check: $(DEV) ## style, format, types, import contracts
 pytest: $(DEV) ## every test, without checks or coverage
 	@$(PYTEST) $(ARGS)
 
+faults: $(DEV) ## 100 kinds of fault x 100 seeds in virtual time, 1,000 healthy runs, 90 real hosts that die; tables in reports/
+	@mkdir -p reports
+	@$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 --markdown reports/faults.md --json reports/faults.json
+	@$(BIN)/python -m tools.host_death --n 30 --markdown reports/host-death.md --json reports/host-death.json
+
 bench: $(DEV) ## measure, print a table
 	@$(BIN)/python -m tools.bench $(ARGS)
 
@@ -54,7 +59,7 @@ lock: | $(BIN)/uv ## pin again after a change in pyproject.toml; ARGS=--upgrade 
 	@$(COMPILE) --extra plot --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
 
 clean: ## remove the environment, caches and reports; recordings in runs/ stay
-	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov .coverage .coverage.* \
+	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov reports .coverage .coverage.* \
 		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	@find dcmp_hil sim_backend tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -70,9 +70,11 @@ class VirtualDevice:
     ) -> None:
         self._config = board_config(rig, NATIVE)
         self._link, self._symlink, self._patience_ms = link, symlink, patience_ms
+        self._clock = clock
         self._pace = None if clock is None else Pace(clock, rig.period)
         self.pins = Pins(rig, count_offset)
         self.now_us = start_us & _WORD
+        self._ticked = (self.now_us, 0, 0)  # the same; when its tick was sent and answered, ns
         self.tick_count = 0
         self.port = ""
         self.output = Output(self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
@@ -172,10 +174,22 @@ class VirtualDevice:
         """Return the true state at the last tick."""
         return self.pins.truth
 
+    def clock_us(self) -> tuple[int, int]:
+        """Return the firmware's clock now, between two ticks too, and by how much it may be further, us.
+
+        In wall time the firmware's clock goes on from when it hears of a tick, which is known to lie between
+        the tick and its answer.
+        """
+        now_us, sent_ns, answered_ns = self._ticked
+        return (now_us + (self._now_ns() - answered_ns) // 1000) & _WORD, (answered_ns - sent_ns) // 1000
+
     @property
     def pid(self) -> int:
         """Of the firmware's process."""
         return self._process.pid if self._process else 0
+
+    def _now_ns(self) -> int:
+        return self._clock.now_ns() if self._clock else 0
 
     def _run(self) -> None:
         try:
@@ -194,12 +208,14 @@ class VirtualDevice:
         self.tick_count += 1
         wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _LIVE else _BRISK_MS
         flags = 0 if self._pace else PLANT_TIME
+        sent_ns = self._now_ns()
         try:
             self._plug().sendall(TICK.pack(self.now_us, self.pins.count(), wait_ms, flags))
         except OSError as error:
             raise self._lost(error) from error
         while not self._listen():
             pass
+        self._ticked = (self.now_us, sent_ns, self._now_ns())
 
     def _listen(self) -> bool:
         """Take what the firmware says; return whether an answer to a tick was among it."""

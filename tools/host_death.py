@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import signal
 import statistics
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,51 +19,94 @@ from dcmp_hil.clock import MonotonicClock, pause
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from sim_backend.device import VirtualDevice
+from tools.cable import Cable
 
 _BOUND_S = 60.0
 _LOOK_S = 0.002
-_TRIES = 10
-WAYS = ("SIGKILL", "SIGSTOP", "unplug")
+_TRIES, _MOST_DOUBT_US = 10, 500
+_DRIVEN_mV = 100
+OFF_US, SEEN_US = 21_000, 2_000  # watchdog and a period; where the device sees its line go down
+WAYS = {"SIGKILL": ("LINK_DOWN", (-9,)), "SIGSTOP": ("HOST_SILENT", (3, 4)), "unplug": ("LINK_DOWN", (3, 4))}
+"""What the device must say, and with what the host may end: a stopped one goes on later, and finds out."""
+
+
+_HEAD = (
+    "| host | n | 0 V after, ms: median | max | bound | after the line went down: max | bound "
+    "| the device says | host's code | wrong | started again | doubt, ms |"
+)
 
 
 class Death(NamedTuple):
-    """How one host ended, and what the device made of it."""
+    """How one host ended, and what the device made of it; times by the firmware's clock."""
 
     way: str
-    off_us: int | None  # firmware's clock, from the tick before the deed to 0 V; None if the device died
+    off_us: int  # from the deed to 0 V
+    seen_us: int | None  # from the line going down to 0 V; None if it did not
     fault: str  # what the device says it was
-    exit_code: int | None  # of the host; None if it was stopped
+    exit_code: int  # of the host
+    doubt_us: int  # by which both may be less
+    stayed_off: bool  # until the end, whatever the host did
+    tries: int  # hosts that were started for it: one that was late by itself, or ill timed, does not count
+
+    @property
+    def wrong(self) -> list[str]:
+        """What is not as it must be."""
+        fault, codes = WAYS[self.way]
+        off_us, seen_us = self.off_us - self.doubt_us, (self.seen_us or 0) - self.doubt_us
+        return [
+            *([f"0 V after {1e-3 * off_us:.1f} ms"] if off_us > OFF_US else []),
+            *([f"0 V {1e-3 * seen_us:.1f} ms after the line went down"] if seen_us > SEEN_US else []),
+            *([f"the device says {self.fault}"] if self.fault != fault else []),
+            *([f"the host ended with {self.exit_code}"] if self.exit_code not in codes else []),
+            *([] if self.stayed_off else ["the amplifier came on again"]),
+        ]
 
 
 def die(way: str) -> Death:
-    """Let a real host drive a virtual device, end one of them, and look at the other."""
-    for _ in range(_TRIES):
-        with VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()) as device:
+    """Let a real host drive a virtual device, part them, and look at both."""
+    for tries in range(1, _TRIES + 1):
+        with ExitStack() as stack:
+            device = stack.enter_context(VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()))
             device.start()
-            host = _start_host(device.port)
+            cable = stack.enter_context(Cable(device.port)) if way == "unplug" else None
+            host = _start_host(cable.port if cable else device.port)
             try:
                 if _is_driven(device, host):
-                    return _unplug(device, host) if way == "unplug" else _end_host(device, host, way)
+                    death = _part(device, host, way, cable)
+                    if death.doubt_us <= _MOST_DOUBT_US:
+                        return death._replace(tries=tries)
             finally:
                 host.kill()
                 host.communicate(timeout=_BOUND_S)
     raise RuntimeError(f"{_TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
 
 
-def _end_host(device: VirtualDevice, host: subprocess.Popen[bytes], way: str) -> Death:
-    began_us = device.now_us
-    host.send_signal(signal.Signals[way])
+def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable: Cable | None) -> Death:
+    if cable is not None:
+        cable.loosen()  # so that nothing is between the clock and the deed
+    began_us, _ = device.clock_us()
+    if cable is not None:
+        cable.pull()
+    else:
+        host.send_signal(signal.Signals[way])
+        os.waitid(os.P_PID, host.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)
+    done_us, doubt_us = device.clock_us()  # it is done by now
     _wait(lambda: not device.output.enable, "the amplifier is off")
     off = next(output for output in device.log if output.fault and not output.enable)
-    code = host.wait(_BOUND_S) if way == "SIGKILL" else None
-    return Death(way, off.since_us - began_us, Fault(off.fault).name, code)
-
-
-def _unplug(device: VirtualDevice, host: subprocess.Popen[bytes]) -> Death:
-    """End the device itself, as a pulled cable does for the host; the host must notice, and say so."""
-    os.kill(device.pid, signal.SIGKILL)
+    if way == "SIGSTOP":
+        host.send_signal(signal.SIGCONT)
     code = host.wait(_BOUND_S)
-    return Death("unplug", None, "", code)
+    since = [output for output in device.log if output.since_us >= off.since_us]
+    return Death(
+        way=way,
+        off_us=off.since_us - (done_us if way == "SIGSTOP" else began_us),
+        seen_us=None if way == "SIGSTOP" else max(0, off.since_us - (began_us if cable else done_us)),
+        fault=Fault(off.fault).name,
+        exit_code=code,
+        doubt_us=doubt_us,
+        stayed_off=not any(output.enable or output.voltage_mV for output in since),
+        tries=1,
+    )
 
 
 def _start_host(port: str) -> subprocess.Popen[bytes]:
@@ -75,7 +120,7 @@ def _is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
     """Wait until the host drives; False if it ended by itself, as on a computer that is busy elsewhere."""
 
     def settled() -> bool:
-        driven = device.output.state == State.RUN and abs(device.output.voltage_mV) > 100  # noqa: PLR2004 - mV
+        driven = device.output.state == State.RUN and abs(device.output.voltage_mV) > _DRIVEN_mV
         return driven or host.poll() is not None
 
     _wait(settled, "the host drives")
@@ -91,24 +136,44 @@ def _wait(holds: object, what: str) -> None:
         pause(_LOOK_S)
 
 
-def main() -> None:
-    """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", type=int, default=30, help="hosts of each way")
-    parser.add_argument("--json", type=Path, default=Path("host-death.json"), metavar="FILE")
-    arguments = parser.parse_args()
-    deaths = [die(way) for way in WAYS for _ in range(arguments.n)]
-    write = sys.stdout.write
-    write("amplifier off after, ms of the firmware's clock (resolution: one period, 1 ms)\n")
-    write(f"{'':10}{'n':>4}{'median':>9}{'max':>9}  faults, exit codes\n")
+def table(deaths: list[Death]) -> str:
+    """Return the figures as Markdown; milliseconds of the firmware's clock."""
+    rows = [_HEAD, re.sub("[^|]+", "---", _HEAD)]
     for way in WAYS:
         these = [death for death in deaths if death.way == way]
-        times = [1e-3 * death.off_us for death in these if death.off_us is not None]
-        shown = f"{statistics.median(times):9.2f}{max(times):9.2f}" if times else f"{'-':>9}{'-':>9}"
-        kinds = sorted({f"{death.fault or '-'} {death.exit_code}" for death in these})
-        write(f"{way:10}{len(these):4}{shown}  {', '.join(kinds)}\n")
-    arguments.json.write_text(json.dumps([death._asdict() for death in deaths], indent=2) + "\n", "utf-8")
+        off = [1e-3 * death.off_us for death in these]
+        seen = [1e-3 * death.seen_us for death in these if death.seen_us is not None]
+        if not these:
+            continue
+        line = (f"{max(seen):.1f}", f"{1e-3 * SEEN_US:g}") if seen else ("", "")
+        cells = (
+            way, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}", f"{1e-3 * OFF_US:g}", *line,
+            ", ".join(sorted({death.fault for death in these})),
+            ", ".join(sorted({str(death.exit_code) for death in these})),
+            sum(bool(death.wrong) for death in these), sum(death.tries - 1 for death in these),
+            f"{1e-3 * max(death.doubt_us for death in these):.2f}",
+        )  # fmt: skip
+        rows.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(rows)
+
+
+def main() -> int:
+    """Measure, print, write; 1 if a bound was broken."""
+    parser = argparse.ArgumentParser(prog="python -m tools.host_death", description=__doc__)
+    parser.add_argument("--n", type=int, default=30, help="hosts of each way (default: 30)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go as well")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="where the table goes as well")
+    asked = parser.parse_args()
+    deaths = [die(way) for way in WAYS for _ in range(asked.n)]
+    said = table(deaths) + "\n"
+    wrong = [f"{death.way}: {', '.join(death.wrong)}\n" for death in deaths if death.wrong]
+    sys.stdout.write(said + "".join(wrong))
+    if asked.markdown:
+        asked.markdown.write_text(said, encoding="utf-8")
+    if asked.json:
+        asked.json.write_text(json.dumps([death._asdict() for death in deaths], indent=2) + "\n", "utf-8")
+    return int(bool(wrong))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
