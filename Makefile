@@ -45,10 +45,11 @@ check: $(DEV) ## style, format, types, import contracts
 pytest: $(DEV) ## every test, without checks or coverage
 	@$(PYTEST) $(ARGS)
 
-faults: $(DEV) ## 100 kinds of fault x 100 seeds in virtual time, 1,000 healthy runs, 90 real hosts that die; tables in reports/
+faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real hosts that end; tables in reports/
 	@mkdir -p reports
 	@$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 --markdown reports/faults.md --json reports/faults.json
 	@$(BIN)/python -m tools.host_death --n 30 --markdown reports/host-death.md --json reports/host-death.json
+	@$(BIN)/python -m tools.host_endings --n 10 --markdown reports/host-endings.md --json reports/host-endings.json
 
 bench: $(DEV) ## measure, print a table
 	@$(BIN)/python -m tools.bench $(ARGS)

@@ -174,14 +174,20 @@ class VirtualDevice:
         """Return the true state at the last tick."""
         return self.pins.truth
 
-    def clock_us(self) -> tuple[int, int]:
-        """Return the firmware's clock now, between two ticks too, and by how much it may be further, us.
+    def clock_us(self, at_ns: int | None = None) -> tuple[int, int]:
+        """Return the firmware's clock, between two ticks too, and by how much it may be further, us.
 
         In wall time the firmware's clock goes on from when it hears of a tick, which is known to lie between
         the tick and its answer.
+
+        Parameters
+        ----------
+        at_ns
+            ns, an instant of the clock that paces the ticks; None is now.
         """
         now_us, sent_ns, answered_ns = self._ticked
-        return (now_us + (self._now_ns() - answered_ns) // 1000) & _WORD, (answered_ns - sent_ns) // 1000
+        gone_ns = (self._now_ns() if at_ns is None else at_ns) - answered_ns
+        return (now_us + gone_ns // 1000) & _WORD, (answered_ns - sent_ns) // 1000
 
     @property
     def pid(self) -> int:

@@ -8,23 +8,21 @@ import os
 import re
 import signal
 import statistics
-import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig
-from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.values import Fault
-from dcmp_hil.wire.messages import State
 from sim_backend.device import VirtualDevice
 from tools.cable import Cable
+from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
 
-_BOUND_S = 60.0
-_LOOK_S = 0.002
-_TRIES, _MOST_DOUBT_US = 10, 500
-_DRIVEN_mV = 100
+if TYPE_CHECKING:
+    import subprocess
+
 OFF_US, SEEN_US = 21_000, 2_000  # watchdog and a period; where the device sees its line go down
 WAYS = {"SIGKILL": ("LINK_DOWN", (-9,)), "SIGSTOP": ("HOST_SILENT", (3, 4)), "unplug": ("LINK_DOWN", (3, 4))}
 """What the device must say, and with what the host may end: a stopped one goes on later, and finds out."""
@@ -64,21 +62,21 @@ class Death(NamedTuple):
 
 def die(way: str) -> Death:
     """Let a real host drive a virtual device, part them, and look at both."""
-    for tries in range(1, _TRIES + 1):
+    for tries in range(1, TRIES + 1):
         with ExitStack() as stack:
             device = stack.enter_context(VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()))
             device.start()
             cable = stack.enter_context(Cable(device.port)) if way == "unplug" else None
-            host = _start_host(cable.port if cable else device.port)
+            host = start_host(cable.port if cable else device.port, "--duration", "0", "--no-record")
             try:
-                if _is_driven(device, host):
+                if is_driven(device, host):
                     death = _part(device, host, way, cable)
-                    if death.doubt_us <= _MOST_DOUBT_US:
+                    if death.doubt_us <= MOST_DOUBT_US:
                         return death._replace(tries=tries)
             finally:
                 host.kill()
-                host.communicate(timeout=_BOUND_S)
-    raise RuntimeError(f"{_TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
+                host.communicate(timeout=BOUND_S)
+    raise RuntimeError(f"{TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
 
 
 def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable: Cable | None) -> Death:
@@ -91,11 +89,11 @@ def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable:
         host.send_signal(signal.Signals[way])
         os.waitid(os.P_PID, host.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)
     done_us, doubt_us = device.clock_us()  # it is done by now
-    _wait(lambda: not device.output.enable, "the amplifier is off")
+    wait(lambda: not device.output.enable, "the amplifier is off")
     off = next(output for output in device.log if output.fault and not output.enable)
     if way == "SIGSTOP":
         host.send_signal(signal.SIGCONT)
-    code = host.wait(_BOUND_S)
+    code = host.wait(BOUND_S)
     since = [output for output in device.log if output.since_us >= off.since_us]
     return Death(
         way=way,
@@ -107,33 +105,6 @@ def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable:
         stayed_off=not any(output.enable or output.voltage_mV for output in since),
         tries=1,
     )
-
-
-def _start_host(port: str) -> subprocess.Popen[bytes]:
-    sets = ("--set", f"backend.port={port}", "--set", "reference.soft_start_s=0.5")
-    options = ("--duration", "0", "--no-record", "--viewer", "none")
-    command = [sys.executable, "-m", "dcmp_hil", "run", "bench-serial", *sets, *options]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # noqa: S603 - our own
-
-
-def _is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
-    """Wait until the host drives; False if it ended by itself, as on a computer that is busy elsewhere."""
-
-    def settled() -> bool:
-        driven = device.output.state == State.RUN and abs(device.output.voltage_mV) > _DRIVEN_mV
-        return driven or host.poll() is not None
-
-    _wait(settled, "the host drives")
-    return host.poll() is None
-
-
-def _wait(holds: object, what: str) -> None:
-    clock = MonotonicClock()
-    until_ns = clock.now_ns() + int(1e9 * _BOUND_S)
-    while not holds():  # type: ignore[operator]
-        if clock.now_ns() > until_ns:
-            raise TimeoutError(f"waited {_BOUND_S:g} s until {what}")
-        pause(_LOOK_S)
 
 
 def table(deaths: list[Death]) -> str:

@@ -55,15 +55,26 @@ class RunFolder:
         """Where the recording goes."""
         return self.path / "run.rrd"
 
-    def write(self, rig: Rig, document: dict[str, Any], result: Result, trip: TripError | None) -> None:
-        """Write everything but the recording; a full disk costs a warning, not the figures on the screen."""
+    def write(
+        self,
+        rig: Rig,
+        document: dict[str, Any],
+        result: Result,
+        trip: TripError | None,
+        *,
+        draw: bool,
+    ) -> None:
+        """Write everything but the recording; a full disk costs a warning, not the figures on the screen.
+
+        Drawing takes seconds, which whoever ended the run early has not got.
+        """
         try:
             console.write_json(
                 str(self.path / "summary.json"), {**document, "rig_toml": rig.model_dump(mode="json")}
             )
             if trip is not None:
                 self._write_black_box(trip)
-            if result.columns:
+            if result.columns and draw:
                 self._draw(result)
         except (OSError, ConfigError) as error:
             console.warn(f"{self.path} is incomplete: {error}")

@@ -142,7 +142,7 @@ def _conclude(
     if options.json_file != "-":
         console.out.print(summary_table(session.rig, result, ended_by))
     if folder is not None:
-        folder.write(session.rig, document, result, trip)
+        folder.write(session.rig, document, result, trip, draw=session.stop.signal is None)
         folder.tell(options.record, live=_viewer(options) != "none")
     if options.json_file is not None:
         console.write_json(options.json_file, document)

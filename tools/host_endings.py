@@ -1,0 +1,232 @@
+"""`python -m tools.host_endings`: end real hosts in every way that leaves them a last word."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import signal
+import statistics
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil import load_rig
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.values import Fault
+from dcmp_hil.wire.messages import State
+from sim_backend.device import VirtualDevice
+from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
+
+if TYPE_CHECKING:
+    import subprocess
+
+OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
+"""Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
+_AT_S = 1.2  # s, device time at which a host's own part raises
+
+_PART = f'''
+import time
+from pathlib import Path
+
+class Wrong(BaseException):
+    """Not even an Exception."""
+
+class _Raises:
+    def __init__(self, setting, what="ValueError"):
+        self._what = {{"ValueError": ValueError, "Wrong": Wrong}}.get(what)
+
+    def _look(self, t):
+        if t >= {_AT_S}:
+            Path("deed").write_text(str(time.monotonic_ns()))
+            if self._what is None:
+                return "no voltage"
+            raise self._what("on purpose")
+
+class Controller(_Raises):
+    def update(self, reference, state):
+        self._t = getattr(self, "_t", 0.0) + 1e-3
+        pull = 4000.0 * (reference.position - state.position) + 130.0 * (reference.velocity - state.velocity)
+        return self._look(self._t) or (pull - state.disturbance) / 5.4
+
+class Observer(_Raises):
+    def __init__(self, setting, what="ValueError"):
+        from dcmp_hil.observers.super_twisting import SuperTwisting
+        super().__init__(setting, what)
+        self._real = SuperTwisting(setting)
+
+    def update(self, sample):
+        self._look(sample.t)
+        return self._real.update(sample)
+'''
+"""A user's own observer and controller, which go wrong; they write down when."""
+
+
+class Way(NamedTuple):
+    """One way to end a host."""
+
+    code: int  # with which it must leave
+    number: signal.Signals | None = None  # sent to it
+    overrides: tuple[str, ...] = ()  # with which it ends by itself
+
+
+def _part_of(section: str, kind: str, what: str) -> Way:
+    return Way(1, None, (f"{section}.kind=goes_wrong:{kind}", f'{section}.options={{what = "{what}"}}'))
+
+
+WAYS = {
+    "Ctrl-C": Way(0, signal.SIGINT),
+    "SIGTERM": Way(143, signal.SIGTERM),
+    "SIGHUP": Way(129, signal.SIGHUP),
+    "controller: Exception": _part_of("controller", "Controller", "ValueError"),
+    "controller: BaseException": _part_of("controller", "Controller", "Wrong"),
+    "observer: Exception": _part_of("observer", "Observer", "ValueError"),
+    "observer: BaseException": _part_of("observer", "Observer", "Wrong"),
+    "the loop itself": _part_of("controller", "Controller", "no voltage"),
+}
+
+
+class Ending(NamedTuple):
+    """What a host did, and what the device made of it; times by the firmware's clock."""
+
+    way: str
+    off_us: int  # from the deed to 0 V
+    gone_s: float  # from the deed until the process was gone; wall
+    exit_code: int
+    state: str  # of the device, afterwards
+    fault: str  # that it kept
+    kept: list[str]  # files in the run's folder that have something in them
+    said: str  # the last line on stderr
+    doubt_us: int  # by which off_us may be less
+    tries: int
+
+    @property
+    def wrong(self) -> list[str]:
+        """What is not as it must be."""
+        code = WAYS[self.way].code
+        return [
+            *([f"0 V after {1e-3 * self.off_us:.1f} ms"] if self.off_us - self.doubt_us > OFF_US else []),
+            *([f"gone after {self.gone_s:.1f} s"] if self.gone_s > GONE_S else []),
+            *([f"code {self.exit_code}: {self.said}"] if self.exit_code != code else []),
+            *([f"{self.state} with {self.fault}"] if (self.state, self.fault) != ("IDLE", "NONE") else []),
+            *([f"kept only {self.kept}"] if not {"summary.json", "run.rrd"} <= {*self.kept} else []),
+        ]
+
+
+def end(name: str) -> Ending:
+    """Let a real host drive a virtual device, end it, and look at both."""
+    for tries in range(1, TRIES + 1):
+        with (
+            tempfile.TemporaryDirectory() as place,
+            VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()) as device,
+        ):
+            folder = Path(place)
+            (folder / "goes_wrong.py").write_text(_PART)
+            device.start()
+            host = _start(device.port, WAYS[name], folder)
+            try:
+                if is_driven(device, host):
+                    ending = _end(device, host, name, folder)
+                    if ending is not None and ending.doubt_us <= MOST_DOUBT_US:
+                        return ending._replace(tries=tries)
+            finally:
+                host.kill()
+                host.communicate(timeout=BOUND_S)
+    raise RuntimeError(f"{TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
+
+
+def _start(port: str, way: Way, folder: Path) -> subprocess.Popen[bytes]:
+    sets = [word for override in way.overrides for word in ("--set", override)]
+    length = "30" if way.number == signal.SIGINT else "0"  # the shorter one leaves a picture, too
+    return start_host(port, "--duration", length, *sets, folder=folder)
+
+
+def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder: Path) -> Ending | None:
+    """End it and look; None if it ended by itself before."""
+    clock, way, deed = MonotonicClock(), WAYS[name], folder / "deed"
+    if way.number is not None:
+        deed.write_text(str(clock.now_ns()))
+        host.send_signal(way.number)
+    wait(lambda: not device.output.enable, "the amplifier is off")
+    if not deed.exists():
+        return None
+    at_ns = int(deed.read_text())
+    deed_us, doubt_us = device.clock_us(at_ns)
+    off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
+    off_us = next(o.since_us for o in device.log if o.since_us > off.since_us and not o.voltage_mV)
+    said = host.communicate(timeout=BOUND_S)[1].decode().strip().splitlines()
+    gone_s = 1e-9 * (clock.now_ns() - at_ns)
+    files = [file for file in folder.glob("runs/*/*") if file.stat().st_size]
+    return Ending(
+        way=name,
+        off_us=off_us - deed_us,
+        gone_s=gone_s,
+        exit_code=host.returncode,
+        state=State(device.output.state).name,
+        fault=Fault(device.output.fault).name,
+        kept=sorted(file.name for file in files),
+        said=said[-1] if said else "",
+        doubt_us=doubt_us,
+        tries=1,
+    )
+
+
+_HEAD = (
+    "| ended by | n | 0 V after, ms: median | max | gone after, s: max | code | device | wrong "
+    "| started again |"
+)
+
+
+def median_us(endings: list[Ending], way: str) -> float:
+    """Return how long it usually was to 0 V, us; 0 if there is none."""
+    return statistics.median([e.off_us - e.doubt_us for e in endings if e.way == way] or [0])
+
+
+def table(endings: list[Ending]) -> str:
+    """Return the figures as Markdown."""
+    rows = [_HEAD, re.sub("[^|]+", "---", _HEAD)]
+    for name in WAYS:
+        these = [ending for ending in endings if ending.way == name]
+        if not these:
+            continue
+        off = [1e-3 * ending.off_us for ending in these]
+        cells = (
+            name, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}",
+            f"{max(ending.gone_s for ending in these):.1f}",
+            ", ".join(sorted({str(ending.exit_code) for ending in these})),
+            ", ".join(sorted({f"{ending.state} {ending.fault}" for ending in these})),
+            sum(bool(ending.wrong) for ending in these), sum(ending.tries - 1 for ending in these),
+        )  # fmt: skip
+        rows.append(f"| {' | '.join(map(str, cells))} |")
+    bounds = (
+        f"bounds, by the firmware's clock: 0 V after {1e-3 * OFF_US:g} ms, the median after "
+        f"{1e-3 * USUAL_US:g} ms; gone after {GONE_S:g} s"
+    )
+    return "\n".join([*rows, "", bounds])
+
+
+def main() -> int:
+    """Measure, print, write; 1 if a bound was broken."""
+    parser = argparse.ArgumentParser(prog="python -m tools.host_endings", description=__doc__)
+    parser.add_argument("--n", type=int, default=10, help="hosts of each way (default: 10)")
+    parser.add_argument("--processes", type=int, default=2, help="(default: 2)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go as well")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="where the table goes as well")
+    asked = parser.parse_args()
+    with ProcessPoolExecutor(asked.processes) as pool:
+        endings = [*pool.map(end, (name for name in WAYS for _ in range(asked.n)))]
+    said = table(endings) + "\n"
+    wrong = [f"{ending.way}: {', '.join(ending.wrong)}\n" for ending in endings if ending.wrong]
+    wrong += [f"{way}: 0 V comes late\n" for way in WAYS if median_us(endings, way) > USUAL_US]
+    sys.stdout.write(said + "".join(wrong))
+    if asked.markdown:
+        asked.markdown.write_text(said, encoding="utf-8")
+    if asked.json:
+        asked.json.write_text(json.dumps([e._asdict() for e in endings], indent=2) + "\n", "utf-8")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

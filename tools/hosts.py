@@ -1,0 +1,57 @@
+"""Real hosts for the benchmarks of how they end: `dcmp-hil run` against a virtual device."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.wire.messages import State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from sim_backend.device import VirtualDevice
+
+BOUND_S = 60.0
+TRIES, MOST_DOUBT_US = 10, 500
+_LOOK_S = 0.002
+_DRIVEN_mV = 100
+
+
+def start_host(port: str, *options: str, folder: Path | None = None) -> subprocess.Popen[bytes]:
+    """Start a host that runs until it is ended."""
+    sets = ("--set", f"backend.port={port}", "--set", "reference.soft_start_s=0.5")
+    command = [sys.executable, "-m", "dcmp_hil", "run", "bench-serial", *sets, "--viewer", "none", *options]
+    return subprocess.Popen(  # noqa: S603 - our own
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
+    """Wait until the host drives; False if it ended by itself, as on a computer that is busy elsewhere."""
+
+    def settled() -> bool:
+        driven = device.output.state == State.RUN and abs(device.output.voltage_mV) > _DRIVEN_mV
+        return driven or host.poll() is not None
+
+    wait(settled, "the host drives")
+    return host.poll() is None
+
+
+def wait(holds: Callable[[], bool], what: str) -> None:
+    """Look every 2 ms until something holds.
+
+    Raises
+    ------
+    TimeoutError
+        If it does not within a minute.
+    """
+    clock = MonotonicClock()
+    until_ns = clock.now_ns() + int(1e9 * BOUND_S)
+    while not holds():
+        if clock.now_ns() > until_ns:
+            raise TimeoutError(f"waited {BOUND_S:g} s until {what}")
+        pause(_LOOK_S)
