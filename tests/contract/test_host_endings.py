@@ -1,4 +1,4 @@
-"""Real hosts that end: 0 V at once, disarmed, everything kept, the right code; `make faults` does it often."""
+"""Real hosts that end: 0 V at once, disarmed, everything kept, the right code."""
 
 from __future__ import annotations
 
