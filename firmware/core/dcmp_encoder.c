@@ -4,10 +4,26 @@
 #define SECOND_US 1000000
 #define JUMP_FACTOR 4 /* times the speed limit */
 #define JUMP_FLOOR 8  /* counts: below, a short period would make a jump of every step */
+#define MOST_WINDOWS 2u /* that speed is taken over */
 
 static int64_t magnitude(int64_t value)
 {
     return value < 0 ? -value : value;
+}
+
+static int64_t lesser(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static int64_t greater(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
+static int64_t middle(int64_t a, int64_t b, int64_t c)
+{
+    return greater(lesser(a, b), lesser(greater(a, b), c));
 }
 
 static int32_t nearest(int64_t value)
@@ -25,18 +41,64 @@ static int32_t difference(uint32_t to, uint32_t from)
     return forward > DCMP_COUNT_MASK / 2u ? (int32_t)forward - (int32_t)DCMP_COUNT_MASK - 1 : (int32_t)forward;
 }
 
+/* Where it was some periods ago. */
+static int64_t past(const struct dcmp_encoder *encoder, uint32_t ago)
+{
+    return encoder->past[(encoder->newest + DCMP_POSITIONS - ago) % DCMP_POSITIONS];
+}
+
+static int64_t change(const struct dcmp_encoder *encoder, uint32_t end, uint32_t periods)
+{
+    return past(encoder, end) - past(encoder, end + periods);
+}
+
+/* A wrong count makes one change too large and one, the other way, when it is the older end: never the middle one. */
+static int64_t middle_change(const struct dcmp_encoder *encoder, uint32_t windows)
+{
+    const uint32_t periods = windows * encoder->span;
+    return middle(change(encoder, 0, periods), change(encoder, 1, periods), change(encoder, 2, periods));
+}
+
+static int64_t middle_position(const struct dcmp_encoder *encoder)
+{
+    return middle(past(encoder, 0), past(encoder, 1), past(encoder, 2));
+}
+
+static bool is_jump(int32_t step, int32_t speed_limit, int32_t period_us)
+{
+    const int64_t most = (int64_t)JUMP_FACTOR * speed_limit * period_us;
+    return magnitude(step) > JUMP_FLOOR && magnitude(step) * SECOND_US > most;
+}
+
+/* One count more than the speed says, at most, for each stretch: a count is no finer than that at either end. */
+static bool above(int64_t moved, int64_t stretches, int32_t speed_limit, int32_t stretch_us)
+{
+    return (magnitude(moved) - stretches) * SECOND_US > stretches * speed_limit * stretch_us;
+}
+
+/* The fewest windows over which it is too fast; more than there are, if over none. */
+static uint32_t windows_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
+{
+    uint32_t windows = 1;
+    while (windows <= MOST_WINDOWS &&
+           !above(middle_change(encoder, windows), windows, speed_limit, encoder->window_us)) {
+        windows++;
+    }
+    return windows;
+}
+
 void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
 {
     encoder->raw = 0;
+    encoder->raw_before = 0;
     encoder->started = false;
     encoder->position = 0;
-    for (uint32_t i = 0; i < DCMP_SPEED_PERIODS_MAX; i++) {
+    for (uint32_t i = 0; i < DCMP_POSITIONS; i++) {
         encoder->past[i] = 0;
     }
-    encoder->oldest = 0;
+    encoder->newest = 0;
     encoder->span = (uint8_t)((SPEED_WINDOW_US + period_us - 1) / period_us);
     encoder->window_us = encoder->span * period_us;
-    encoder->change = 0;
     encoder->jump = 0;
     encoder->jumped = false;
     dcmp_history_init(&encoder->jumps);
@@ -47,26 +109,30 @@ void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
 void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t speed_limit, int32_t period_us)
 {
     const int32_t step = encoder->started ? difference(counts, encoder->raw) : 0;
-    const int64_t most = (int64_t)JUMP_FACTOR * speed_limit * period_us;
-    encoder->started = true;
-    encoder->raw = counts & DCMP_COUNT_MASK;
-    encoder->jumped = magnitude(step) > JUMP_FLOOR && magnitude(step) * SECOND_US > most;
+    const int32_t two_steps = encoder->started ? difference(counts, encoder->raw_before) : 0;
+    const bool near_a_jump = encoder->jumped;
+    encoder->jumped = is_jump(step, speed_limit, period_us);
     dcmp_history_add(&encoder->jumps, encoder->jumped);
     if (encoder->jumped) {
         encoder->jump = step;
-    } else {
+    }
+    if ((near_a_jump || encoder->jumped) && !above(two_steps, 2, speed_limit, period_us)) {
+        encoder->position = past(encoder, 1) + two_steps; /* the count between was wrong */
+    } else if (!encoder->jumped) {
         encoder->position += step;
     }
-    encoder->change = (int32_t)(encoder->position - encoder->past[encoder->oldest]);
-    encoder->past[encoder->oldest] = encoder->position;
-    encoder->oldest = (uint8_t)((encoder->oldest + 1u) % encoder->span);
+    encoder->raw_before = encoder->started ? encoder->raw : counts & DCMP_COUNT_MASK;
+    encoder->raw = counts & DCMP_COUNT_MASK;
+    encoder->started = true;
+    encoder->newest = (uint8_t)((encoder->newest + 1u) % DCMP_POSITIONS);
+    encoder->past[encoder->newest] = encoder->position;
 }
 
 void dcmp_encoder_anchor(struct dcmp_encoder *encoder)
 {
     if (!encoder->anchored) {
         encoder->anchored = true;
-        encoder->origin = encoder->position;
+        encoder->origin = middle_position(encoder);
     }
 }
 
@@ -75,23 +141,23 @@ bool dcmp_encoder_too_jumpy(const struct dcmp_encoder *encoder)
     return encoder->jumped && encoder->jumps.count >= DCMP_JUMP_LIMIT;
 }
 
-/* One count more than the speed says: a count is no finer than that at either end. */
 bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
 {
-    return (magnitude(encoder->change) - 1) * SECOND_US > (int64_t)speed_limit * encoder->window_us;
+    return windows_too_fast(encoder, speed_limit) <= MOST_WINDOWS;
 }
 
 bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_limit)
 {
-    return magnitude(encoder->position - encoder->origin) > travel_limit;
+    return magnitude(middle_position(encoder) - encoder->origin) > travel_limit;
 }
 
-int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder)
+int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, int32_t speed_limit)
 {
-    return nearest((int64_t)encoder->change * SECOND_US / encoder->window_us);
+    const uint32_t windows = windows_too_fast(encoder, speed_limit) == MOST_WINDOWS ? MOST_WINDOWS : 1u;
+    return nearest(middle_change(encoder, windows) * SECOND_US / ((int64_t)windows * encoder->window_us));
 }
 
 int32_t dcmp_encoder_travel(const struct dcmp_encoder *encoder)
 {
-    return nearest(encoder->position - encoder->origin);
+    return nearest(middle_position(encoder) - encoder->origin);
 }

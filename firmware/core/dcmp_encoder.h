@@ -1,4 +1,5 @@
-/* Modular counts in; travel, speed and jumps out. */
+/* Modular counts in; travel, speed and jumps out.
+ * Of travel and speed the middle one of the newest three periods counts, so that one wrong count never shows. */
 #ifndef DCMP_ENCODER_H
 #define DCMP_ENCODER_H
 
@@ -9,22 +10,23 @@
 
 #define DCMP_COUNT_MASK 0xFFFFFFu /* the wire has 24 bits, so no more are looked at */
 #define DCMP_SPEED_PERIODS_MAX 20u
+#define DCMP_POSITIONS (2u * DCMP_SPEED_PERIODS_MAX + 3u) /* twice the window, ending in each of three periods */
 #define DCMP_JUMP_LIMIT 3u /* within 100 periods */
 
 struct dcmp_encoder {
-    uint32_t raw;                           /* the newest count modulo 2^24 */
+    uint32_t raw;                 /* the newest count modulo 2^24 */
+    uint32_t raw_before;          /* the one before */
     bool started;
-    int64_t position;                       /* unwrapped, without jumps */
-    int64_t past[DCMP_SPEED_PERIODS_MAX];   /* positions of the periods before, a ring */
-    uint8_t oldest;                         /* where in the ring */
-    uint8_t span;                           /* periods that speed is taken over */
-    int32_t window_us;                      /* the same in us */
-    int32_t change;                         /* of the count over `window_us`, without jumps */
-    int32_t jump;                           /* the last one, counts */
-    bool jumped;                            /* in the newest period */
+    int64_t position;             /* unwrapped, without jumps */
+    int64_t past[DCMP_POSITIONS]; /* the newest positions, a ring */
+    uint8_t newest;               /* where in the ring */
+    uint8_t span;                 /* periods that speed is taken over, or twice as many */
+    int32_t window_us;            /* the same in us */
+    int32_t jump;                 /* the last one, counts */
+    bool jumped;                  /* in the newest period */
     struct dcmp_history jumps;
     bool anchored;
-    int64_t origin;                         /* where it was when it was armed for the first time */
+    int64_t origin;               /* where it was when it was armed for the first time */
 };
 
 void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us);
@@ -39,8 +41,8 @@ bool dcmp_encoder_too_jumpy(const struct dcmp_encoder *encoder);
 bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit);
 bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_limit);
 
-/* For reports: counts/s, counts; the nearest 32-bit number. */
-int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder);
+/* For reports: counts/s, counts; the nearest 32-bit number. The speed is the one that is too high, if one is. */
+int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, int32_t speed_limit);
 int32_t dcmp_encoder_travel(const struct dcmp_encoder *encoder);
 
 #endif

@@ -40,11 +40,12 @@ void dcmp_guard_time(struct dcmp_device *device, uint32_t now_us)
 void dcmp_guard_limits(struct dcmp_device *device)
 {
     const struct dcmp_encoder *encoder = &device->encoder;
+    const int32_t speed_limit = device->parameters.value[DCMP_SPEED_LIMIT_COUNTS_S];
     if (dcmp_encoder_too_jumpy(encoder)) {
         dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_ENCODER_JUMP, encoder->jump);
     }
-    if (dcmp_encoder_too_fast(encoder, device->parameters.value[DCMP_SPEED_LIMIT_COUNTS_S])) {
-        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_SPEED, dcmp_encoder_speed(encoder));
+    if (dcmp_encoder_too_fast(encoder, speed_limit)) {
+        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_SPEED, dcmp_encoder_speed(encoder, speed_limit));
     }
     if (dcmp_encoder_too_far(encoder, device->parameters.value[DCMP_TRAVEL_LIMIT_COUNTS])) {
         dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, dcmp_encoder_travel(encoder));

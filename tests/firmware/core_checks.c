@@ -204,3 +204,46 @@ uint32_t check_silence(struct dcmp_device *device, uint32_t period_us, uint32_t 
     }
     return UINT32_MAX;
 }
+
+#define TURNED 60 /* periods before the wrong count: more than are looked back at */
+
+/* True count some periods after the wrong one; the counter wraps on the way there. */
+static int64_t turned(int32_t speed, int32_t period_us, int32_t after)
+{
+    return (int64_t)speed * period_us * (TURNED + after) / 1000000;
+}
+
+static uint32_t shown(int64_t count)
+{
+    return (uint32_t)(count - 5); /* wraps while it turns */
+}
+
+static bool noticed(struct dcmp_encoder encoder, int32_t speed_limit, int32_t period_us, int32_t speed, int64_t wrong)
+{
+    bool bad = false;
+    const int32_t periods = 2 * encoder.span + 3;
+    for (int32_t after = 0; after < periods && !bad; after++) {
+        const int64_t count = turned(speed, period_us, after);
+        const int64_t travel = count < 0 ? -count : count;
+        dcmp_encoder_tick(&encoder, shown(after == 0 ? count + wrong : count), speed_limit, period_us);
+        bad = dcmp_encoder_too_fast(&encoder, speed_limit) || dcmp_encoder_too_jumpy(&encoder) ||
+              dcmp_encoder_too_far(&encoder, (int32_t)travel) || (after > 0 && encoder.position != count);
+    }
+    return bad;
+}
+
+uint32_t check_wrong_counts(int32_t speed_limit, int32_t period_us, int32_t speed, uint32_t least, uint32_t most)
+{
+    struct dcmp_encoder encoder;
+    uint32_t bad = 0;
+    dcmp_encoder_init(&encoder, period_us);
+    dcmp_encoder_anchor(&encoder);
+    for (int32_t after = -TURNED; after < 0; after++) {
+        dcmp_encoder_tick(&encoder, shown(turned(speed, period_us, after)), speed_limit, period_us);
+    }
+    for (uint32_t size = least; size <= most; size++) {
+        bad += noticed(encoder, speed_limit, period_us, speed, (int64_t)size) ? 1u : 0u;
+        bad += noticed(encoder, speed_limit, period_us, speed, -(int64_t)size) ? 1u : 0u;
+    }
+    return bad;
+}

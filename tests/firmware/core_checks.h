@@ -1,4 +1,5 @@
-/* Loops too long for Python: exhaustive bit flips, garbage, silence. */
+/* Loops too long for Python: exhaustive bit flips, garbage, silence,
+ * wrong counts. */
 #ifndef CORE_CHECKS_H
 #define CORE_CHECKS_H
 
@@ -40,5 +41,9 @@ uint32_t check_drive(struct dcmp_device *device, const struct dcmp_config *confi
 /* After check_drive: ticks go on, DRIVEs do not. Returns how long after the last DRIVE the voltage was 0, in us. */
 uint32_t check_silence(struct dcmp_device *device, uint32_t period_us, uint32_t last_us, uint32_t phase_us,
                        uint32_t most_us);
+
+/* An encoder at a steady speed shows one wrong count, too high and too low, of each size from `least` to `most`. Returns of
+ * how many of those the limits, or the position after them, take notice. */
+uint32_t check_wrong_counts(int32_t speed_limit, int32_t period_us, int32_t speed, uint32_t least, uint32_t most);
 
 #endif
