@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tests.contract import stranger_wire as wire
-from tests.contract.stranger_wire import ARMING, BOOT, FAULTED, IDLE, RUN, Motion
+from tests.contract.stranger_motion import Motion
+from tests.contract.stranger_wire import ARMING, BOOT, FAULTED, IDLE, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

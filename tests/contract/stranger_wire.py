@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 import struct
-from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -206,46 +205,6 @@ class Outbox:
         out = sorted(self._newest.items()) + self.answers
         self.answers, self._newest = [], {}
         return out
-
-
-class Motion:
-    """The encoder's count, without jumps, and its limits."""
-
-    def __init__(self, period_us: int) -> None:
-        self.raw: int | None = None
-        self._period_us = period_us
-        self._count = 0
-        self._zero: int | None = None
-        self._window: deque[int] = deque(maxlen=-(-1000 // period_us) + 1)
-        self._jumps: deque[int] = deque(maxlen=3)
-        self._now = 0
-
-    def armed(self) -> None:
-        """Travel is counted from where this happens first."""
-        self._zero = self._count if self._zero is None else self._zero
-
-    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
-        """Follow the encoder; return the change if it is a jump, else 0."""
-        change = 0 if self.raw is None else (counts - self.raw + (1 << 23)) % (1 << 24) - (1 << 23)
-        self.raw, self._now = counts & 0xFFFFFF, tick
-        jump = abs(change) > 8 and abs(change) * 1_000_000 > 4 * speed_limit * self._period_us
-        if jump:
-            self._jumps.append(tick)
-        else:
-            self._count += change
-        self._window.append(self._count)
-        return change if jump else 0
-
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
-        """Yield code and detail of each limit that is exceeded."""
-        if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 100:
-            yield ENCODER_JUMP, jump
-        moved, span_us = self._window[-1] - self._window[0], (len(self._window) - 1) * self._period_us
-        if (abs(moved) - 1) * 1_000_000 > speed_limit * span_us:
-            yield OVER_SPEED, int(moved * 1_000_000 / span_us)
-        travel = self._count - (self._zero or 0)
-        if abs(travel) > travel_limit:
-            yield OVER_TRAVEL, travel
 
 
 class Parameters:

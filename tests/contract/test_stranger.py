@@ -470,6 +470,7 @@ def test_a_fault_is_cleared_by_two_drives_of_one_session(ready: Host) -> None:
 @pytest.mark.parametrize("sign", [1, -1])
 def test_speed_limit(running: Host, sign: int) -> None:
     assert running.run(30, moved=sign * 33).state == RUN
+    assert running.run(1, 1000, moved=sign * 34).state == RUN  # may be a wrong count
     sample = running.run(1, 1000, moved=sign * 34)
     assert (sample.state, sample.fault_class) == (FAULTED, wire.OVER_SPEED)
     code, tick, detail = running.fault()
@@ -485,7 +486,8 @@ def test_travel_limit_counts_from_the_first_arming(host: Callable[..., Host]) ->
     h.drive(arm=0)
     h.tick()
     h.arm()
-    assert h.run(1, moved=1).fault_class == wire.OVER_TRAVEL
+    assert h.run(1, moved=1).state == RUN  # may be a wrong count
+    assert h.run(1).fault_class == wire.OVER_TRAVEL
     assert h.fault()[2] == 301
 
 
@@ -494,7 +496,42 @@ def test_the_third_jump_within_100_periods(running: Host) -> None:
         assert running.run(1, moved=jump).state == RUN
         assert running.run(110, moved=0).state == RUN
     assert running.run(1, moved=9000).state == RUN
-    assert running.run(1, moved=131).fault_class == wire.OVER_SPEED  # not above four times 32.768
+    assert running.run(1, moved=131).state == RUN
+    assert running.run(1).fault_class == wire.OVER_SPEED  # not above four times 32.768
+    assert running.fault()[2] == 65_500  # over twice the time
+
+
+@pytest.mark.parametrize("wrong", [1, 34, 68, 98, 99, 131, 132, 163, 164, 165, 9000, 2**23 - 1, 2**23])
+@pytest.mark.parametrize(("period_us", "speed"), [(1000, 0), (1000, 32), (100, 3)])
+def test_one_wrong_count(device: Callable[..., Device], wrong: int, period_us: int, speed: int) -> None:
+    """Sizes around one and two times the speed limit, and where one way or both are jumps."""
+    for sign in (1, -1):
+        h = Host(device(period_us=period_us), "cobs", node=0, first_tick=0)
+        h.arm()
+        h.run(30, moved=speed)
+        sample = h.run(1, moved=speed + sign * wrong)
+        assert (sample.state, sample.position) == (RUN, h.counts % 2**24)
+        assert h.run(1, moved=speed - sign * wrong).state == RUN
+        assert h.run(30, moved=speed).state == RUN
+
+
+@pytest.mark.parametrize(("wrong", "state"), [(67, RUN), (68, FAULTED), (131, FAULTED)])
+def test_two_wrong_counts_in_a_row(running: Host, wrong: int, state: int) -> None:
+    assert running.run(1, moved=wrong).state == RUN
+    assert running.run(1, moved=0).state == state
+    assert running.run(1, moved=-wrong).state == state
+
+
+def test_one_wrong_count_is_no_travel(host: Callable[..., Host]) -> None:
+    h = host(travel_limit_counts=100)
+    h.arm()
+    assert h.run(4, moved=25).state == RUN
+    assert h.run(1, moved=60).state == RUN
+    assert h.run(1, moved=-60).state == RUN
+    assert h.run(30).state == RUN
+    assert h.run(1, moved=1).state == RUN
+    assert h.run(1).fault_class == wire.OVER_TRAVEL
+    assert h.fault()[2] == 101
 
 
 def test_three_jumps(running: Host) -> None:

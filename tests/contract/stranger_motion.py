@@ -1,0 +1,71 @@
+"""The encoder and its limits as a stranger reads them in docs/protocol.md."""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+from typing import TYPE_CHECKING
+
+from tests.contract.stranger_wire import ENCODER_JUMP, OVER_SPEED, OVER_TRAVEL
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def _shortest(change: int) -> int:
+    return (change + (1 << 23)) % (1 << 24) - (1 << 23)
+
+
+class Motion:
+    """The encoder's count, without jumps and wrong counts, and its limits."""
+
+    def __init__(self, period_us: int) -> None:
+        self.raw: int | None = None
+        self._raws: deque[int] = deque(maxlen=2)
+        self._period_us = period_us
+        self._periods = -(-1000 // period_us)
+        kept = 2 * self._periods + 3
+        self._counts: deque[int] = deque([0] * kept, maxlen=kept)  # the oldest first; at rest before boot
+        self._zero: int | None = None
+        self._jumps: deque[int] = deque(maxlen=3)
+        self._now = 0
+
+    def armed(self) -> None:
+        """Travel is counted from where this happens first."""
+        self._zero = self._travelled() if self._zero is None else self._zero
+
+    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+        """Follow the encoder; return the change if it is a jump, else 0."""
+        self._now, jumped_before = tick, tick - 1 in self._jumps
+        self.raw = counts & 0xFFFFFF
+        older, old = (self._raws or [self.raw])[0], (self._raws or [self.raw])[-1]
+        change, over_two = _shortest(counts - old), _shortest(counts - older)
+        self._raws.append(self.raw)
+        jump = abs(change) > 8 and abs(change) * 1_000_000 > 4 * speed_limit * self._period_us
+        if jump:
+            self._jumps.append(tick)
+        back = abs(over_two) <= 2 + 2 * speed_limit * self._period_us / 1_000_000
+        if back and (jump or jumped_before):
+            self._counts.append(self._counts[-2] + over_two)
+        else:
+            self._counts.append(self._counts[-1] + (0 if jump else change))
+        return change if jump else 0
+
+    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+        """Yield code and detail of each limit that is exceeded."""
+        if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 100:
+            yield ENCODER_JUMP, jump
+        for times in (1, 2):
+            moved, span_us = self._moved(times * self._periods), times * self._periods * self._period_us
+            if (abs(moved) - times) * 1_000_000 > speed_limit * span_us:
+                yield OVER_SPEED, int(moved * 1_000_000 / span_us)
+        travel = self._travelled() - (self._zero or 0)
+        if abs(travel) > travel_limit:
+            yield OVER_TRAVEL, travel
+
+    def _moved(self, periods: int) -> int:
+        counts = list(self._counts)
+        return statistics.median_low(counts[-k] - counts[-k - periods] for k in (1, 2, 3))
+
+    def _travelled(self) -> int:
+        return statistics.median_low(list(self._counts)[-3:])
