@@ -279,6 +279,16 @@ def test_two_wrong_counts_in_a_row_show_at_10_khz(core: Core) -> None:
             assert _tick(bench, 4 + error - before) == code
 
 
+def test_the_shortest_period_looks_back_as_far(core: Core) -> None:
+    """Twice 20 periods from each of three ticks; over 20 periods nothing is too fast."""
+    encoder = core.new("struct dcmp_encoder *")
+    for farthest, too_fast in [(83, True), (82, False)]:
+        core.lib.dcmp_encoder_init(encoder, 50)
+        for ago, position in [(0, 83), (1, 83), (2, farthest), (20, 42), (21, 42), (22, 42), (40, 83)]:
+            encoder.past[-ago % len(encoder.past)] = position
+        assert core.lib.dcmp_encoder_too_fast(encoder, 40_000) == too_fast
+
+
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_over_speed_is_found_within_two_milliseconds(core: Core, direction: int) -> None:
     """From rest, at every speed that is no jump: one tick after the change over 1 ms is too large."""
