@@ -102,8 +102,8 @@ _TURNING = ("reference.rate_rad_s=2.0",)  # the reference turns round while the 
 PLANT = (
     Row("plant.enc_stuck", ENCODER_OFF, _DETECTED_MS, 3.0, 8.0),
     Row("plant.enc_glitch:counts=10"),
-    Row("plant.enc_glitch:counts=50", open="the firmware takes it for speed"),
-    Row("plant.enc_glitch:counts=100", open="the firmware takes it for speed"),
+    Row("plant.enc_glitch:counts=50"),
+    Row("plant.enc_glitch:counts=100"),
     Row("plant.enc_glitch:counts=200"),
     Row("plant.enc_glitch:counts=1000"),
     Row("plant.enc_glitch:counts=-1e6"),
