@@ -1,0 +1,237 @@
+"""Host backend, supervisor, wire, firmware and plant, a period at a time, with faults switched on and off."""
+
+from __future__ import annotations
+
+import functools
+import math
+import random
+import secrets
+from typing import TYPE_CHECKING, NamedTuple
+from unittest.mock import patch
+
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.wire import cobs
+from dcmp_hil.wire.codec import pack
+from dcmp_hil.wire.messages import State
+from sim_backend.board import Board
+from sim_backend.faults import Fault, FaultPlan
+from sim_backend.pace import Pace
+from tests.helpers import bench
+from tests.stateful.host import Host
+from tests.stateful.judge import Judge
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+    from dcmp_hil.wire.messages import Message
+    from sim_backend.fault_kinds.effect import Effect
+    from sim_backend.fault_kinds.injection import Injection
+    from sim_backend.fault_kinds.link import FaultyLink
+
+FAULTS = {
+    "wire.drop": {"p": 1.0, "way": "up"},
+    "wire.dup": {"p": 1.0},
+    "wire.delay": {"ms": 5, "way": "up"},
+    "wire.reorder": {"p": 0.5, "depth": 4},
+    "wire.flip": {"p": 0.5, "bits": 2},
+    "wire.truncate": {"p": 0.3},
+    "wire.insert": {"p": 0.3},
+    "wire.garbage": {"p": 0.3},
+    "wire.hold": {"ms": 30},
+    "wire.blackhole": {"p": 1.0, "way": "down"},
+    "wire.unplug": {},
+    "plant.enc_stuck": {},
+    "plant.enc_jump": {"counts": 3000, "times": 3, "every": 2},
+    "plant.enc_glitch": {"counts": 500, "times": 3},
+    "plant.shove": {"rad_s2": 400.0},
+}
+"""What can befall it, by kind."""
+
+_SEQ = 0x1FFF
+_LEASE, _QUIET = 600, 60  # ticks: a session lapses; nothing of an earlier fault is on its way any more
+_REST, _PATIENCE = 50, 400
+_AGAIN = 60  # periods in which a healthy start must have full authority
+_ENCODER = 2.0 * math.tau / 4096  # rad
+
+
+class Start(NamedTuple):
+    """Where the device's counters begin."""
+
+    us: int = 0
+    tick: int = 0
+    count: int = 0
+
+
+@functools.cache
+def rig_at(count: int) -> Rig:
+    """Return the bench rig for an encoder that begins there."""
+    zero = (count + (1 << 23)) % (1 << 24) - (1 << 23)
+    return bench("backend.kind=sim-board", f"encoder.zero={zero}")
+
+
+class System:
+    """A board, and perhaps a host that runs it.
+
+    Parameters
+    ----------
+    seed
+        Of everything random in it.
+    start
+        Of the board's counters.
+    """
+
+    def __init__(self, seed: int = 0, start: Start = Start()) -> None:  # noqa: B008 - it is immutable
+        self.clock, self.luck = SimulatedClock(), random.Random(seed)
+        self.board = Board(
+            rig_at(start.count), start_us=start.us, first_tick=start.tick, count_offset=start.count
+        )
+        self.judge = Judge(first_tick=start.tick, ticked=self._ticked)
+        faults = [Fault(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
+        self.rig = FaultPlan(faults, seed).on(rig_at(start.count), self.judge, self.board)
+        self._injection: Injection = self.rig.backend.injection  # type: ignore[union-attr]
+        effects = (timer.effect for timer in self._injection.timers)
+        self._effects: dict[str, Effect] = dict(zip(FAULTS, effects, strict=True))
+        self._ends: dict[str, int] = {}  # ticks of the board
+        self._disturbed = -_QUIET  # tick of the board at which the last fault was on
+        self._plug_in()
+        self.host: Host | None = None
+
+    @property
+    def violations(self) -> list[str]:
+        """What was found."""
+        return self.judge.violations
+
+    @property
+    def quiet(self) -> bool:
+        """Whether what one side says reaches the other, and has for a while."""
+        return self.board.tick_count - self._disturbed > _QUIET
+
+    def open(self) -> bool:
+        """Let a host open the device; False if it cannot, or one has it open."""
+        if self.host is not None:
+            return False
+        backend = DeviceBackend(self.rig, self._plug_in(), self.clock)
+        with patch.object(secrets, "randbelow", self.luck.randrange):
+            try:
+                backend.__enter__()
+            except DcmpError:
+                return False
+        self.host = Host(backend, self.judge, self.board.owner)
+        return True
+
+    def close(self, error: DcmpError | None = None) -> None:
+        """Let it go, in an orderly way or for a reason."""
+        if self.host is None:
+            return
+        backend, self.host = self.host.backend, None
+        try:
+            backend.__exit__(type(error) if error else None, error, None)
+        except DcmpError:
+            return
+        if self.quiet and self.board.state == State.RUN:
+            self.judge.note("the host has gone, and the device runs")
+
+    def period(self, demand: float = 0.0) -> None:
+        """Let the host have its period, or the board alone."""
+        host = self.host
+        if host is None:
+            self.alone(1)
+            return
+        try:
+            host.period(demand)
+        except DcmpError as error:
+            self.close(error)
+            return
+        if self.quiet:
+            self._compare(host)
+        if host.supervisor.trip is not None:
+            host.look_after_trip(demand)
+            self.close(host.supervisor.trip)
+
+    def alone(self, ticks: int) -> None:
+        """Let the board go on while the host does nothing."""
+        self._link.elapse(ticks)
+
+    def befall(self, kind: str, ticks: int) -> None:
+        """Switch a fault on for so long."""
+        effect = self._effects[kind]
+        self._ends[kind] = self.board.tick_count + ticks
+        if not effect.on:
+            effect.on = True
+            effect.begin()
+
+    def say(self, message: Message) -> None:
+        """Let somebody on the line say something to the board."""
+        self.inject(cobs.encode(pack(message, 0)))
+
+    def inject(self, piece: bytes) -> None:
+        """Put bytes on the line to the board."""
+        self.judge.heard(piece)
+        self.board.receive(piece)
+
+    def seq(self, age: int = 0) -> int:
+        """Return the seq of a command that answers a SAMPLE of that age."""
+        return (self.judge.newest - age) & _SEQ
+
+    def reset(self) -> None:
+        """Press the board's button."""
+        self.board.reset()
+        self.judge.was_reset()
+
+    def heal(self) -> None:
+        """Let every fault end, the session lapse and the arm come to rest."""
+        self.close()
+        for kind in tuple(self._ends):
+            self._end(kind)
+        self.board.link(up=True)
+        self.inject(b"\0")  # whatever was left on the line
+        self.alone(_LEASE)
+        for _ in range(_PATIENCE):
+            if self.board.truth().velocity == 0.0:
+                break
+            self.alone(_REST)
+        self.reset()  # somebody has brought the arm back: travel counts from here
+        self.alone(_QUIET + 1)
+
+    def run_again(self) -> None:
+        """Start as after any removal of a fault: it must reach full authority, and obey."""
+        self.heal()
+        if not self.open() or self.host is None:
+            self.judge.note("healed, it does not open")
+            return
+        for _ in range(_AGAIN):
+            self.period(0.2)
+        host = self.host
+        if host is None or not host.has_authority or self.board.state != State.RUN:
+            self.judge.note(f"healed, it does not run: device {self.board.state}, fault {self.board.fault}")
+        elif self.board.applied_mV != 200:
+            self.judge.note(f"healed, {self.board.applied_mV} mV are put out where 200 were asked for")
+
+    def _compare(self, host: Host) -> None:
+        """What host and device know of each other, nothing being lost between them."""
+        if host.supervisor.trip is not None:
+            return
+        if self.judge.told != State.RUN:
+            self.judge.note(f"the device is in state {self.judge.told}, the host in {host.supervisor.phase}")
+        sample, truth = host.sample, self.board.truth()
+        if not abs(sample.position - truth.position) < _ENCODER:
+            self.judge.note(f"the arm is at {truth.position} rad, the host says {sample.position}")
+
+    def _plug_in(self) -> FaultyLink:
+        pace = Pace(self.clock, self.rig.period)
+        self._link = self._injection.attach(self.board, "cobs", pace)
+        return self._link
+
+    def _ticked(self) -> None:
+        now = self.board.tick_count
+        if self._ends:
+            self._disturbed = now
+            for kind in [kind for kind, end in self._ends.items() if now >= end]:
+                self._end(kind)
+
+    def _end(self, kind: str) -> None:
+        del self._ends[kind]
+        effect = self._effects[kind]
+        effect.on = False
+        effect.end()
