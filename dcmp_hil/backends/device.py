@@ -241,8 +241,9 @@ class DeviceBackend:
 
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
-        self._count = nearest(0, raw, 24)
-        self._zero = self._count if self._terms.zero is None else self._terms.zero
+        zero = self._terms.zero
+        self._count = nearest(zero or 0, raw, 24)  # a zero near the counter's wrap has counts beyond it near it
+        self._zero = self._count if zero is None else zero
 
     def _fault_in(self, report: SampleReport) -> int:
         if report.fault_class == Fault.NONE:

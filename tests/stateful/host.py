@@ -40,9 +40,7 @@ class Host:
         self.objector = Objector()
         limits = Limits(voltage=MOST, period=PERIOD, notify=self._notified)
         monitors = (Finite(), self.objector)
-        self.supervisor = Supervisor(
-            monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified
-        )
+        self.supervisor = Supervisor(monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified)
         self.sample = Sample(-math.inf, 0.0, 0.0)
         self._phase, self._since = Phase.ARMING, 0.0
 
@@ -60,13 +58,15 @@ class Host:
         self.supervisor.engages(sample)
         voltage = self.supervisor.admit(sample, self._estimate, demand)
         self.judge.wrote(voltage)
-        self._look(voltage)
+        self._look(voltage, demand)
         self.backend.write(voltage)
 
     def look_after_trip(self, demand: float) -> None:
         """Make a supervisor that has tripped go on: it must not."""
         later = self.sample._replace(t=self.sample.t + 1.0, fault=Fault.NONE)
         self.objector.objects = False
+        for stop in (self.supervisor.stop_orderly, self.supervisor.stop_now):
+            stop(TripError("test", "once more", ""), later.t)
         began = self.supervisor.engages(later)
         voltage = self.supervisor.admit(later, self._estimate, demand)
         if began or voltage != 0.0 or self.supervisor.phase is not Phase.TRIPPED:
@@ -76,15 +76,15 @@ class Host:
     def _estimate(self) -> Estimate:
         return Estimate(self.sample.position, 0.0, 0.0)
 
-    def _look(self, voltage: float) -> None:
+    def _look(self, voltage: float, demand: float) -> None:
         phase, gone = self.supervisor.phase, self.sample.t - self._since
         if not abs(voltage) <= self._most(phase, gone):
             self.judge.note(f"{voltage} V in {phase}, {gone} s after it began")
         if phase is Phase.STOPPING and gone > STOP + 1e-9:
             self.judge.note(f"{phase} for {gone} s")
-        ended = self.sample.fault != Fault.NONE or self.objector.objects
+        ended = self.sample.fault != Fault.NONE or self.objector.objects or not math.isfinite(demand)
         if ended and (phase is not Phase.TRIPPED or voltage != 0.0):
-            self.judge.note(f"{voltage} V in {phase}: fault {self.sample.fault}, {self.objector.objects}")
+            self.judge.note(f"{voltage} V in {phase}: fault {self.sample.fault}, demand {demand}")
 
     def _most(self, phase: Phase, gone: float) -> float:
         if phase in _POWERLESS:

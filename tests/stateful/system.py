@@ -11,10 +11,10 @@ from unittest.mock import patch
 
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.clock import SimulatedClock
-from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.errors import DcmpError
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.messages import State
+from dcmp_hil.wire.messages import State, Stop
 from sim_backend.board import Board
 from sim_backend.faults import Fault, FaultPlan
 from sim_backend.pace import Pace
@@ -48,10 +48,12 @@ FAULTS = {
 }
 """What can befall it, by kind."""
 
+_TICKING = ("wire.unplug",)  # they do something in every tick
 _SEQ = 0x1FFF
 _LEASE, _QUIET = 600, 60  # ticks: a session lapses; nothing of an earlier fault is on its way any more
 _REST, _PATIENCE = 50, 400
 _AGAIN = 60  # periods in which a healthy start must have full authority
+_NEAR = 3.0  # rad
 _ENCODER = 2.0 * math.tau / 4096  # rad
 
 
@@ -92,6 +94,8 @@ class System:
         self._injection: Injection = self.rig.backend.injection  # type: ignore[union-attr]
         effects = (timer.effect for timer in self._injection.timers)
         self._effects: dict[str, Effect] = dict(zip(FAULTS, effects, strict=True))
+        ticking = zip(FAULTS, tuple(self._injection.timers), strict=True)
+        self._injection.timers[:] = [timer for kind, timer in ticking if kind in _TICKING]  # for speed
         self._ends: dict[str, int] = {}  # ticks of the board
         self._disturbed = -_QUIET  # tick of the board at which the last fault was on
         self._plug_in()
@@ -165,6 +169,13 @@ class System:
         """Let somebody on the line say something to the board."""
         self.inject(cobs.encode(pack(message, 0)))
 
+    def stop(self, reason: int) -> None:
+        """Let somebody say STOP, which has to be obeyed at once."""
+        self.inject(b"\0" + cobs.encode(pack(Stop(reason), 0)))
+        board = self.board
+        if board.state not in (State.BOOT, State.FAULT) or board.applied_mV or board.enable:
+            self.judge.note(f"state {board.state}, {board.applied_mV} mV after STOP")
+
     def inject(self, piece: bytes) -> None:
         """Put bytes on the line to the board."""
         self.judge.heard(piece)
@@ -191,7 +202,8 @@ class System:
             if self.board.truth().velocity == 0.0:
                 break
             self.alone(_REST)
-        self.reset()  # somebody has brought the arm back: travel counts from here
+        if not abs(self.board.truth().position) < _NEAR:
+            self.reset()  # somebody has brought the arm back: travel counts from here
         self.alone(_QUIET + 1)
 
     def run_again(self) -> None:

@@ -1,0 +1,119 @@
+"""The machine can fail: errors sown into host and firmware, each found within a small budget."""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis.stateful import run_state_machine_as_test
+
+from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.backends.goodbye import Goodbye
+from dcmp_hil.limits import Limits
+from dcmp_hil.monitors import Finite
+from dcmp_hil.supervisor import TABLE, Cue, Phase, Supervisor
+from dcmp_hil.values import Fault
+from sim_backend import firmware, hostlib
+from tests.stateful.machine import Machine
+from tests.stateful.test_machine import budget
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+EXAMPLES, LENGTH = 60, 100
+Patch = pytest.MonkeyPatch
+
+pytestmark = pytest.mark.usefixtures("untraced")
+
+
+def _table(phase: Phase, cue: Cue, following: Phase) -> Callable[[Patch], None]:
+    changed = {here: dict(cues) for here, cues in TABLE.items()}
+    changed[phase][cue] = following
+    return lambda patch: patch.setattr("dcmp_hil.supervisor.TABLE", changed)
+
+
+def _method(kind: type, name: str, other: Any) -> Callable[[Patch], None]:
+    return lambda patch: patch.setattr(kind, name, other)
+
+
+IN_HOST = {
+    "a device's fault is overlooked": _method(Finite, "check", lambda *_: None),
+    "a trip is not for good": _table(Phase.TRIPPED, Cue.FAULT, Phase.SETTLING),
+    "a fault goes back to settling": _table(Phase.RUNNING, Cue.FAULT, Phase.SETTLING),
+    "an orderly end that never ends": _table(Phase.STOPPING, Cue.STOPPED, Phase.STOPPING),
+    "an orderly end with full authority": _table(Phase.STOPPING, Cue.STOPPED, Phase.RUNNING),
+    "no ramp": _method(Supervisor, "_partial_voltage", lambda _, __, demand: demand),
+    "no clamp": _method(Limits, "voltage", lambda _, __, demand, ___: demand),
+    "NaN is let through": lambda patch: patch.setattr("dcmp_hil.supervisor._check_finite", lambda *_: None),
+    "whatever the device says, it is well": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
+    "no goodbye": _method(Goodbye, "run", lambda *_, **__: True),
+}
+
+IN_FIRMWARE = {
+    "ENABLE stays high in a fault": (
+        "boards/hostlib/hostlib.c", "view->enable = output.enable;",
+        "view->enable = output.enable || view->state == 4;",
+    ),
+    "no watchdog": ("core/dcmp_watchdog.c", "> watchdog->time_us", "> 40u * watchdog->time_us"),
+    "the watchdog is a little late": (
+        "core/dcmp_watchdog.c", "> watchdog->time_us", "> watchdog->time_us + 6000u",
+    ),
+    "a refused command feeds the watchdog": (
+        "core/dcmp_receive.c", "case DCMP_GAP:", "case DCMP_GAP: dcmp_watchdog_feed(&device->watchdog, now_us, 20, 20);",
+    ),
+    "old commands are accepted": ("core/dcmp_session.c", "if (age > oldest) {", "if (age > oldest + 4u) {"),
+    "anybody may drive": ("core/dcmp_session.c", "return candidate != 0u && candidate == session->owner;", "return candidate != 0u;"),
+    "the fault is left without its edge": (
+        "core/dcmp_supervisor.c", "{BOOT, IDLE,   IDLE,   IDLE,  FAULT},\n    [DCMP_EVENT_CLEAR]",
+        "{BOOT, IDLE,   IDLE,   IDLE,  IDLE},\n    [DCMP_EVENT_CLEAR]",
+    ),
+    "the voltage stays after RUN": ("core/dcmp_guard.c", "dcmp_amplifier_cut(&device->amplifier);", ""),
+    "STOP is not obeyed in RUN": (
+        "core/dcmp_supervisor.c", "{BOOT, FAULT,  FAULT,  FAULT, FAULT}", "{BOOT, FAULT,  FAULT,  RUN, FAULT}",
+    ),
+    "the limit is forgotten": (
+        "core/dcmp_amplifier.c", "clamp(amplifier->target_mV, -limit_mV, limit_mV)", "clamp(amplifier->target_mV, -2 * limit_mV, 2 * limit_mV)",
+    ),
+    "a session never lapses": ("core/dcmp_session.h", "500000u", "500000000u"),
+}  # fmt: skip
+
+
+def found() -> str:
+    """Return what the machine finds in so small a budget."""
+    with pytest.raises(AssertionError) as caught:
+        run_state_machine_as_test(Machine, settings=budget(EXAMPLES, LENGTH))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("error", IN_HOST, ids=str)
+def test_machine_finds_an_error_in_the_host(error: str, monkeypatch: Patch) -> None:
+    IN_HOST[error](monkeypatch)
+    assert "tick" in found()
+
+
+@pytest.fixture
+def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str], None]]:
+    """Give a way to change the firmware's sources, for this test."""
+    root = tmp_path / "firmware"
+    shutil.copytree(firmware.sources(), root)
+
+    def sow(file: str, old: str, new: str) -> None:
+        path = root / file
+        text = path.read_text()
+        assert text.count(old) == 1, file
+        path.write_text(text.replace(old, new))
+        hostlib.load.cache_clear()
+
+    monkeypatch.setattr("sim_backend.firmware._PLACES", (root,))
+    monkeypatch.setattr("sim_backend.firmware._FLAGS", ("-std=c11", "-O1"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    yield sow
+    hostlib.load.cache_clear()
+
+
+@pytest.mark.parametrize("error", IN_FIRMWARE, ids=str)
+def test_machine_finds_an_error_in_the_firmware(error: str, sown: Callable[[str, str, str], None]) -> None:
+    sown(*IN_FIRMWARE[error])
+    assert "tick" in found()
