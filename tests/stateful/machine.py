@@ -23,6 +23,7 @@ STARTS = st.builds(
     st.sampled_from([0, 2**15 - 3, 2**23 - 400, 2**24 - 3, -(2**31) + 2]),
 )
 SILENCES = st.sampled_from([1, 2, 3, 9, 10, 18, 19, 20, 21, 22, 25, 40])
+FIRST = st.sampled_from([0, 20])  # periods: after 20 a run has full authority
 STRANGER = 0xBEEF
 
 
@@ -36,10 +37,10 @@ class Machine(RuleBasedStateMachine):
         super().__init__()
         self.system = System()
 
-    @initialize(seed=st.integers(0, 1000), start=STARTS)
-    def boot(self, seed: int, start: Start) -> None:
+    @initialize(seed=st.integers(0, 1000), start=STARTS, periods=FIRST)
+    def boot(self, seed: int, start: Start, periods: int) -> None:
         self.system = System(seed, start)
-        self.system.open()
+        self.open(periods)
 
     @rule(periods=st.integers(1, 4), volts=VOLTS)
     def run(self, periods: int, volts: float) -> None:
@@ -147,9 +148,11 @@ class Machine(RuleBasedStateMachine):
         self.system.close()
 
     @precondition(lambda self: self.system.host is None)
-    @rule()
-    def open(self) -> None:
-        self.system.open()
+    @rule(periods=FIRST)
+    def open(self, periods: int) -> None:
+        if self.system.open():
+            for _ in range(periods):
+                self.system.period()
 
     @precondition(lambda self: self.system.host is None)
     @rule(ticks=st.sampled_from([10, 30, 60, 505]))

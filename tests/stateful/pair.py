@@ -1,0 +1,234 @@
+"""Host and device as one machine with a line that loses, doubles, delays and reorders; searched exhaustively."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil.supervisor import TABLE, Cue, Phase
+from tests.stateful.device_model import Command, Device, Rules, State
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+SMALL = Rules(arming=2, oldest=1, watchdog=2)
+OURS, THEIRS = 1, 2  # sessions
+OFF, CLEARING, CLEARED, ARMING, BYE = "off", "clearing", "cleared", "arming the device", "bye"
+_POWERED = (Phase.PROBING, Phase.ENGAGING, Phase.RUNNING, Phase.STOPPING)
+_ENDS = (Phase.STOPPING, Phase.TRIPPED)
+_DEPTH = 2  # commands on the line
+_STRANGE = [
+    Command(THEIRS),
+    Command(THEIRS, volts=True),
+    Command(THEIRS, flag=""),
+    Command(THEIRS, flag="clear"),
+]
+_HEALTHY = 60  # periods
+
+
+class Pair(NamedTuple):
+    """Everything that decides what happens next, and one thing to judge it by."""
+
+    device: Device
+    host: str = OFF
+    line: tuple[Command, ...] = ()
+    told: State | None = None  # a SAMPLE on its way
+    silent: int = 0  # periods since a command was accepted, whatever the device makes of it
+
+
+class Model:
+    """The two together.
+
+    Parameters
+    ----------
+    rules
+        The device's.
+    table
+        The host's.
+    deaf
+        Whether the host overlooks that the device has left RUN: an error to find.
+    """
+
+    def __init__(
+        self,
+        rules: Rules = SMALL,
+        table: Mapping[Phase, Mapping[Cue, Phase]] = TABLE,
+        *,
+        deaf: bool = False,
+    ) -> None:
+        self.rules, self.table, self._deaf = rules, table, deaf
+
+    def start(self) -> Pair:
+        """Return the pair as it is switched on."""
+        return Pair(self.rules.boot())
+
+    def following(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
+        """Return what may happen, with its name."""
+        yield from self._time(pair)
+        yield from self._line(pair)
+        yield from self._host(pair)
+        yield from self._others(pair)
+
+    def _time(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
+        oldest = self.rules.oldest + 1
+        line = tuple(command._replace(age=min(command.age + 1, oldest)) for command in pair.line)
+        silent = min(pair.silent + 1, SMALL.watchdog + 2)
+        for limit in (False, True):
+            device = self.rules.tick(pair.device, limit=limit)
+            yield "tick", Pair(device, pair.host, line, device.state, silent)
+
+    def _line(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
+        for place, command in enumerate(pair.line):
+            rest = pair.line[:place] + pair.line[place + 1 :]
+            yield "lost", pair._replace(line=rest)
+            heard = self._heard(pair, command)
+            yield f"heard {command}", heard._replace(line=rest)
+            yield f"heard {command}", heard  # and once more, later
+        if pair.told is not None:
+            yield "lost", pair._replace(told=None)
+
+    def _heard(self, pair: Pair, command: Command) -> Pair:
+        accepted = self.rules.accepts(self.rules.guard(pair.device), command)
+        device = self.rules.command(pair.device, command)
+        return pair._replace(device=device, silent=0 if accepted else pair.silent)
+
+    def _host(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
+        if pair.host == OFF:
+            device = self.rules.hello(pair.device, OURS)
+            if device.owner == OURS:
+                yield "start", pair._replace(device=device, host=CLEARING, line=(), told=None)
+            return
+        yield "the host dies", pair._replace(host=OFF)
+        if pair.told is not None:
+            for host, command in self.answers(pair.host, pair.told):
+                line = tuple(sorted({*pair.line, command})) if len(pair.line) < _DEPTH else pair.line
+                yield "host", pair._replace(host=host, line=line, told=None)
+
+    def answers(self, host: str, told: State) -> Iterator[tuple[str, Command]]:
+        """Return what a host may do about a SAMPLE: where it is then, and what it says."""
+        if host == CLEARING:
+            yield (CLEARED, Command(OURS, flag="")) if told == State.FAULT else (ARMING, Command(OURS))
+        elif host == CLEARED:
+            yield (ARMING, Command(OURS)) if told == State.IDLE else (CLEARED, Command(OURS, flag="clear"))
+        elif host == ARMING:
+            yield (Phase.ARMING if told == State.RUN else ARMING), Command(OURS)
+        elif host == BYE:
+            yield OFF, Command(OURS, flag="release")
+        else:
+            yield from self._supervised(Phase(host), told)
+
+    def _supervised(self, phase: Phase, told: State) -> Iterator[tuple[str, Command]]:
+        if phase is Phase.TRIPPED:
+            yield BYE, Command(OURS, flag="")
+        cues = self.table[phase]
+        if told != State.RUN and not self._deaf and Cue.FAULT in cues:
+            phases = [cues[Cue.FAULT]]
+        else:
+            phases = [phase, *dict.fromkeys(cues.values())]
+        for following in phases:
+            for volts in (False, True) if following in _POWERED else (False,):
+                yield following, Command(OURS, volts=volts)
+
+    def _others(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
+        rules, device = self.rules, pair.device
+        for name, after in (
+            ("stop", rules.stop(device)),
+            ("corruption", rules.corrupt(device)),
+            ("unplugged", rules.link(device, up=False)),
+            ("plugged in", rules.link(device, up=True)),
+            ("lapse", rules.lapse(device)),
+            ("their HELLO", rules.hello(device, THEIRS)),
+        ):
+            yield name, pair._replace(device=after)
+        yield "reset", pair._replace(device=rules.boot())
+        if device.owner:
+            for command in _STRANGE:
+                yield f"heard {command}", self._heard(pair, command)
+
+
+def violation(before: Pair, event: str, after: Pair) -> str | None:
+    """Return what does not hold of a step; None if all does."""
+    was, device = before.device, after.device
+    if (device.out or device.asked) and device.state != State.RUN:
+        return "a voltage outside RUN"
+    if device.state == State.RUN and event == "tick" and after.silent > SMALL.watchdog:
+        return "RUN, and nobody has been heard of"
+    if was.state == State.FAULT and device.state not in (State.FAULT, State.BOOT):
+        edge = (
+            was.lowered and event.startswith("heard") and "flag='clear'" in event and "volts=False" in event
+        )
+        if not edge:
+            return "a fault is left without the owner's edge"
+    if was.state not in (State.ARMING, State.RUN) and device.state == State.RUN:
+        return "RUN without ARMING"
+    if was.state == State.ARMING and device.state == State.RUN and was.counted + 1 < SMALL.arming:
+        return "RUN after too few commands"
+    if after.silent == 0 and before.silent and event.startswith("heard"):
+        wrong = "age=2" in event or f"session={was.owner}," not in event
+        if wrong:
+            return "a command that is too old, or a stranger's, is accepted"
+    return _host_violation(before, event, after)
+
+
+def _host_violation(before: Pair, event: str, after: Pair) -> str | None:
+    if event != "host":
+        return None
+    live = after.host in set(Phase) - {Phase.TRIPPED}
+    if live and before.told != State.RUN:
+        return "the host goes on, and the device has said that it is not in RUN"
+    if before.host == Phase.TRIPPED and after.host not in (Phase.TRIPPED, BYE):
+        return "TRIPPED is left"
+    new = set(after.line) - set(before.line)
+    if any(command.volts for command in new) and after.host not in _POWERED:
+        return "a voltage without authority"
+    order = list(Phase)
+    if (
+        before.host in order
+        and after.host in order
+        and order.index(Phase(after.host)) < order.index(Phase(before.host))
+    ):
+        return "the host goes back"
+    return None
+
+
+def search(model: Model) -> tuple[set[Pair], str | None]:
+    """Return every state that can be reached, or those up to the first step that does not hold, and why."""
+    start = model.start()
+    seen, waiting = {start}, [start]
+    for pair in waiting:
+        for event, after in model.following(pair):
+            wrong = violation(pair, event, after)
+            if wrong is not None:
+                return seen, f"{wrong}: {pair}, {event}, {after}"
+            if after not in seen:
+                seen.add(after)
+                waiting.append(after)
+    return seen, None
+
+
+def stuck(model: Model, pairs: set[Pair]) -> Pair | None:
+    """Return a state from which a new host on a healthy line does not get to RUNNING; None if there is none."""
+    tried: set[Device] = set()
+    for pair in pairs:
+        device = model.rules.tick(model.rules.link(model.rules.lapse(pair.device), up=True))
+        if device not in tried:
+            tried.add(device)
+            if not _reaches(model, device):
+                return pair
+    return None
+
+
+def _reaches(model: Model, device: Device) -> bool:
+    rules = model.rules
+    for _ in range(rules.watchdog + 2):  # whoever was there is silent, and his session lapses
+        device = rules.tick(device)
+    device, host = rules.hello(rules.lapse(device), OURS), CLEARING
+    for _ in range(_HEALTHY):
+        device = rules.tick(device)
+        answers = [answer for answer in model.answers(host, device.state) if answer[0] not in _ENDS]
+        if not answers:
+            return False
+        host, command = answers[-1]  # as far on as can be, with a voltage
+        device = rules.command(device, command)
+        if host == Phase.RUNNING and device.state == State.RUN and device.asked:
+            return True
+    return False
