@@ -62,7 +62,7 @@ class Start(NamedTuple):
 
     us: int = 0
     tick: int = 0
-    count: int = 0
+    encoder: int = 0
 
 
 @functools.cache
@@ -86,11 +86,11 @@ class System:
     def __init__(self, seed: int = 0, start: Start = Start()) -> None:  # noqa: B008 - it is immutable
         self.clock, self.luck = SimulatedClock(), random.Random(seed)
         self.board = Board(
-            rig_at(start.count), start_us=start.us, first_tick=start.tick, count_offset=start.count
+            rig_at(start.encoder), start_us=start.us, first_tick=start.tick, count_offset=start.encoder
         )
         self.judge = Judge(first_tick=start.tick, ticked=self._ticked)
         faults = [Fault(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
-        self.rig = FaultPlan(faults, seed).on(rig_at(start.count), self.judge, self.board)
+        self.rig = FaultPlan(faults, seed).on(rig_at(start.encoder), self.judge, self.board)
         self._injection: Injection = self.rig.backend.injection  # type: ignore[union-attr]
         effects = (timer.effect for timer in self._injection.timers)
         self._effects: dict[str, Effect] = dict(zip(FAULTS, effects, strict=True))
@@ -209,7 +209,7 @@ class System:
     def run_again(self) -> None:
         """Start as after any removal of a fault: it must reach full authority, and obey."""
         self.heal()
-        if not self.open() or self.host is None:
+        if not self.open():
             self.judge.note("healed, it does not open")
             return
         for _ in range(_AGAIN):

@@ -10,7 +10,7 @@ import pytest
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Drive, Hello, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from tests.firmware.bench import Bench, Core
+from tests.firmware.bench import Core
 from tests.firmware.core_library import build, load
 from tests.stateful.device_model import NEXT, Command, Device, Rules, State
 
@@ -46,8 +46,8 @@ class Twin:
 
     def command(self, command: Command) -> None:
         seq = (self.device.tick - command.age) & 0x1FFF
-        flags = [command.flag == name for name in ("arm", "clear", "release")]
-        self.say(Drive(1000 * command.volts, seq, *flags, command.session, TTL))  # type: ignore[misc]
+        arm, clear, release = (command.flag == name for name in ("arm", "clear", "release"))
+        self.say(Drive(1000 * command.volts, seq, arm, clear, release, command.session, TTL))
 
     def tick(self, counts: int = 0) -> None:
         self.now, self.counts = self.now + 1000, self.counts + counts
@@ -80,7 +80,7 @@ def _hello(session: int) -> Event:
     return lambda r, d: r.hello(d, session), lambda t: t.say(Hello(session, PROTOCOL_HASH))
 
 
-def _link(up: bool) -> Event:  # noqa: FBT001
+def _link(up: bool) -> Event:
     return (
         lambda r, d: r.link(d, up=up),
         lambda t: t.lib.dcmp_device_link(t.device, up, t.now),

@@ -1,4 +1,4 @@
-"""Host x device x line, every state of them: 118,285 with the sizes of `pair.SMALL`; and errors that it finds."""
+"""Every state of host, device and line, 118,285 of them; and errors that the search finds."""
 
 from __future__ import annotations
 

@@ -61,20 +61,25 @@ IN_FIRMWARE = {
         "core/dcmp_watchdog.c", "> watchdog->time_us", "> watchdog->time_us + 6000u",
     ),
     "a refused command feeds the watchdog": (
-        "core/dcmp_receive.c", "case DCMP_GAP:", "case DCMP_GAP: dcmp_watchdog_feed(&device->watchdog, now_us, 20, 20);",
+        "core/dcmp_receive.c", "case DCMP_GAP:",
+        "case DCMP_GAP: dcmp_watchdog_feed(&device->watchdog, now_us, 20, 20);",
     ),
     "old commands are accepted": ("core/dcmp_session.c", "if (age > oldest) {", "if (age > oldest + 4u) {"),
-    "anybody may drive": ("core/dcmp_session.c", "return candidate != 0u && candidate == session->owner;", "return candidate != 0u;"),
+    "anybody may drive": (
+        "core/dcmp_session.c", "candidate != 0u && candidate == session->owner", "candidate != 0u",
+    ),
     "the fault is left without its edge": (
         "core/dcmp_supervisor.c", "{BOOT, IDLE,   IDLE,   IDLE,  FAULT},\n    [DCMP_EVENT_CLEAR]",
         "{BOOT, IDLE,   IDLE,   IDLE,  IDLE},\n    [DCMP_EVENT_CLEAR]",
     ),
     "the voltage stays after RUN": ("core/dcmp_guard.c", "dcmp_amplifier_cut(&device->amplifier);", ""),
     "STOP is not obeyed in RUN": (
-        "core/dcmp_supervisor.c", "{BOOT, FAULT,  FAULT,  FAULT, FAULT}", "{BOOT, FAULT,  FAULT,  RUN, FAULT}",
+        "core/dcmp_supervisor.c", "{BOOT, FAULT,  FAULT,  FAULT, FAULT}",
+        "{BOOT, FAULT,  FAULT,  RUN, FAULT}",
     ),
     "the limit is forgotten": (
-        "core/dcmp_amplifier.c", "clamp(amplifier->target_mV, -limit_mV, limit_mV)", "clamp(amplifier->target_mV, -2 * limit_mV, 2 * limit_mV)",
+        "core/dcmp_amplifier.c", "clamp(amplifier->target_mV, -limit_mV, limit_mV)",
+        "clamp(amplifier->target_mV, -2 * limit_mV, 2 * limit_mV)",
     ),
     "a session never lapses": ("core/dcmp_session.h", "500000u", "500000000u"),
 }  # fmt: skip
