@@ -242,7 +242,7 @@ class DeviceBackend:
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
         zero = self._terms.zero
-        self._count = nearest(zero or 0, raw, 24)  # a zero near the counter's wrap has counts beyond it near it
+        self._count = nearest(zero or 0, raw, 24)  # near the counter's wrap it matters
         self._zero = self._count if zero is None else zero
 
     def _fault_in(self, report: SampleReport) -> int:

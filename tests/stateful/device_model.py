@@ -16,23 +16,23 @@ class State(IntEnum):
     FAULT = 4
 
 
-B, I, A, R, F = State
+B, N, A, R, F = State
 ARM, ARM_LAST, DRIVE, DISARM, CLEAR, RELEASE = "arm", "arm last", "drive", "disarm", "clear", "release"
 TICK, SILENCE, LINK_DOWN, LIMIT, CORRUPTION, STOP = "tick", "silence", "link", "limit", "corruption", "stop"
 
 Table = dict[str, tuple[State, ...]]
 NEXT: Table = {  # from BOOT, IDLE, ARMING, RUN, FAULT
-    TICK: (I, I, A, R, F),
+    TICK: (N, N, A, R, F),
     ARM: (B, A, A, R, F),
     ARM_LAST: (B, A, R, R, F),
-    DRIVE: (B, I, I, R, F),
-    DISARM: (B, I, I, I, F),
-    CLEAR: (B, I, I, I, I),
-    RELEASE: (B, I, I, I, F),
-    SILENCE: (B, I, I, F, F),
-    LINK_DOWN: (B, I, I, F, F),
-    LIMIT: (B, I, A, F, F),
-    CORRUPTION: (B, I, A, F, F),
+    DRIVE: (B, N, N, R, F),
+    DISARM: (B, N, N, N, F),
+    CLEAR: (B, N, N, N, N),
+    RELEASE: (B, N, N, N, F),
+    SILENCE: (B, N, N, F, F),
+    LINK_DOWN: (B, N, N, F, F),
+    LIMIT: (B, N, A, F, F),
+    CORRUPTION: (B, N, A, F, F),
     STOP: (B, F, F, F, F),
 }
 """In the order of enum dcmp_event."""
@@ -167,10 +167,6 @@ class Rules:
             return CLEAR
         if command.flag != "arm":
             return DISARM
-        if command.volts:
+        if command.volts or (device.state == A and not close):
             return DRIVE
-        if device.state != A:
-            return ARM
-        if not close:
-            return DRIVE
-        return ARM if device.counted + 1 < self.arming else ARM_LAST
+        return ARM if device.state != A or device.counted + 1 < self.arming else ARM_LAST

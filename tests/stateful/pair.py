@@ -1,4 +1,4 @@
-"""Host and device as one machine with a line that loses, doubles, delays and reorders; searched exhaustively."""
+"""Host and device as one machine with a line that loses, doubles and reorders, searched exhaustively."""
 
 from __future__ import annotations
 
@@ -147,26 +147,41 @@ class Model:
 
 def violation(before: Pair, event: str, after: Pair) -> str | None:
     """Return what does not hold of a step; None if all does."""
-    was, device = before.device, after.device
+    return (
+        _output_violation(event, after)
+        or _state_violation(before.device, event, after.device)
+        or _command_violation(before, event, after)
+        or _host_violation(before, event, after)
+    )
+
+
+def _output_violation(event: str, after: Pair) -> str | None:
+    device = after.device
     if (device.out or device.asked) and device.state != State.RUN:
         return "a voltage outside RUN"
     if device.state == State.RUN and event == "tick" and after.silent > SMALL.watchdog:
         return "RUN, and nobody has been heard of"
+    return None
+
+
+def _state_violation(was: Device, event: str, device: Device) -> str | None:
     if was.state == State.FAULT and device.state not in (State.FAULT, State.BOOT):
-        edge = (
-            was.lowered and event.startswith("heard") and "flag='clear'" in event and "volts=False" in event
-        )
-        if not edge:
+        cleared = event.startswith("heard") and "flag='clear'" in event and "volts=False" in event
+        if not (was.lowered and cleared):
             return "a fault is left without the owner's edge"
-    if was.state not in (State.ARMING, State.RUN) and device.state == State.RUN:
-        return "RUN without ARMING"
-    if was.state == State.ARMING and device.state == State.RUN and was.counted + 1 < SMALL.arming:
-        return "RUN after too few commands"
-    if after.silent == 0 and before.silent and event.startswith("heard"):
-        wrong = "age=2" in event or f"session={was.owner}," not in event
-        if wrong:
-            return "a command that is too old, or a stranger's, is accepted"
-    return _host_violation(before, event, after)
+    if device.state == State.RUN != was.state:
+        if was.state != State.ARMING:
+            return "RUN without ARMING"
+        if was.counted + 1 < SMALL.arming:
+            return "RUN after too few commands"
+    return None
+
+
+def _command_violation(before: Pair, event: str, after: Pair) -> str | None:
+    accepted = after.silent == 0 and before.silent and event.startswith("heard")
+    if accepted and ("age=2" in event or f"session={before.device.owner}," not in event):
+        return "a command that is too old, or a stranger's, is accepted"
+    return None
 
 
 def _host_violation(before: Pair, event: str, after: Pair) -> str | None:
@@ -206,7 +221,7 @@ def search(model: Model) -> tuple[set[Pair], str | None]:
 
 
 def stuck(model: Model, pairs: set[Pair]) -> Pair | None:
-    """Return a state from which a new host on a healthy line does not get to RUNNING; None if there is none."""
+    """Return a state from which a new host on a healthy line does not get to RUNNING, if there is one."""
     tried: set[Device] = set()
     for pair in pairs:
         device = model.rules.tick(model.rules.link(model.rules.lapse(pair.device), up=True))

@@ -1,4 +1,4 @@
-"""The model of the device is the firmware: both walk, side by side, through everything the model can reach."""
+"""The model of the device is the firmware: both walk side by side through everything it can reach."""
 
 from __future__ import annotations
 
@@ -22,10 +22,8 @@ if TYPE_CHECKING:
 TTL = 5  # ms: the shortest watchdog
 RULES = Rules(arming=10, oldest=3, watchdog=TTL)
 SESSIONS = (1, 2)
-COMMANDS = [
-    Command(session, age, volts, flag)
-    for session, age, volts, flag in product(SESSIONS, (0, 1, 3, 4), (False, True), ("arm", "", "clear", "release"))
-]  # fmt: skip
+FLAGS = ("arm", "", "clear", "release")
+COMMANDS = [Command(*fields) for fields in product(SESSIONS, (0, 1, 3, 4), (False, True), FLAGS)]
 
 
 class Twin:
@@ -60,8 +58,8 @@ class Twin:
         supervisor = device.supervisor
         assert out.enable == (supervisor.state == State.RUN)
         return (
-            supervisor.state, device.session.owner, supervisor.counted, supervisor.lowered, out.voltage_mV != 0,
-            device.link_up,
+            supervisor.state, device.session.owner, supervisor.counted, supervisor.lowered,
+            out.voltage_mV != 0, device.link_up,
         )  # fmt: skip
 
 
