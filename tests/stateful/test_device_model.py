@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 TTL = 5  # ms: the shortest watchdog
 RULES = Rules(arming=10, oldest=3, watchdog=TTL)
+TOO_FAST = 42  # counts a period
 SESSIONS = (1, 2)
 FLAGS = ("arm", "", "clear", "release")
 COMMANDS = [Command(*fields) for fields in product(SESSIONS, (0, 1, 3, 4), (False, True), FLAGS)]
@@ -47,9 +48,22 @@ class Twin:
         arm, clear, release = (command.flag == name for name in ("arm", "clear", "release"))
         self.say(Drive(1000 * command.volts, seq, arm, clear, release, command.session, TTL))
 
-    def tick(self, counts: int = 0) -> None:
-        self.now, self.counts = self.now + 1000, self.counts + counts
+    def tick(self) -> None:
+        self.now += 1000
         self.lib.dcmp_device_tick(self.device, self.now, self.counts, self.core.ffi.NULL)
+
+    def rush(self) -> None:
+        """Tick for the second time at a speed above the limit, which the first time is not enough to see.
+
+        The first time is put into its memory, and both are taken out again: the model has no memory.
+        """
+        encoder = self.device.encoder
+        for i in range(len(encoder.past)):
+            encoder.past[i] -= TOO_FAST * (i != encoder.newest)
+        self.counts += TOO_FAST
+        self.tick()
+        for i in range(len(encoder.past)):
+            encoder.past[i] = encoder.position
 
     def seen(self) -> tuple[object, ...]:
         """Return what the model has as well."""
@@ -87,7 +101,7 @@ def _link(up: bool) -> Event:
 
 EVENTS: list[Event] = [
     (Rules.tick, lambda t: t.tick()),
-    (lambda r, d: r.tick(d, limit=True), lambda t: t.tick(42)),
+    (lambda r, d: r.tick(d, limit=True), lambda t: t.rush()),
     (Rules.stop, lambda t: t.say(Stop(3))),
     (Rules.corrupt, lambda t: [t.lib.dcmp_device_corrupt(t.device, t.now) for _ in range(10)]),
     *map(_link, (False, True)),
