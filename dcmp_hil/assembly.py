@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
     from dcmp_hil.observers import Observer
+    from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.values import Event
 
@@ -40,7 +41,9 @@ _PROBE_V, _OVER_FRICTION = 1.0, 2.0  # V; friction that a push must overcome by 
 _WATCH_FLOOR = 100.0  # rad/s, mu0 of the watching observer
 
 
-def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) -> tuple[Line, Recorder]:
+def assemble(
+    rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool, apart: Apart | None = None
+) -> tuple[Line, Recorder]:
     """Make every stage of the line, and the recorder that it reports to.
 
     Raises
@@ -57,6 +60,7 @@ def assemble(rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool) ->
         sinks,
         recent=max(1, round(rig.loop.rate_hz)),
         in_line=in_line,
+        apart=apart,
     )
     measured = rig.controller.position == "measured"
     supervisor = make_supervisor(rig, recorder.event)

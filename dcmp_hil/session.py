@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,20 +14,24 @@ from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.host import host_facts, in_words
 from dcmp_hil.realtime import Grant, RealTime
+from dcmp_hil.telemetry.apart import Apart
+from dcmp_hil.telemetry.figures import Figures
 from dcmp_hil.telemetry.keeper import Keeper
+from dcmp_hil.telemetry.makers import make_all, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics, Summary
 from dcmp_hil.trajectory import LOWERING
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
 
     from dcmp_hil.backends.device import LinkCounters
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.recorder import Sink
+    from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.makers import SinkMaker
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,11 +89,15 @@ class Session:
     window_from
         s, device time from which the figures count.
     sinks
-        Who else looks on.
+        Who else looks on: sinks, or functions that make one. In real time a function that can be pickled is
+        called in the telemetry process, and its sink shares nothing with the loop; every other sink runs on a
+        thread of this process, which costs the loop its punctuality.
     keep_columns
         False for long runs: memory then stays bounded.
     stop
         Asked once a period; its own unless somebody listens for signals earlier already.
+    warn
+        Told, in a sentence, what of telemetry the run goes on without.
     """
 
     def __init__(
@@ -99,23 +107,32 @@ class Session:
         duration: float | None = None,
         fast: bool = False,
         window_from: float = 0.0,
-        sinks: Sequence[Sink] = (),
+        sinks: Sequence[Sink | SinkMaker] = (),
         keep_columns: bool = True,
         stop: StopRequest | None = None,
+        warn: Callable[[str], None] | None = None,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
         self.rig = rig
         self._length = length or math.inf
-        self._statistics = Statistics(rig.period, window_from)
-        self._keeper = Keeper() if keep_columns else None
         self._wall = MonotonicClock()
-        own: list[Sink] = [self._statistics, *([self._keeper] if self._keeper else [])]
         clock = SimulatedClock() if fast else self._wall
         self.stop = stop or StopRequest()
         self._realtime = None if fast else RealTime(rig.timing)
         self._host = host_facts()
-        self._line, self._recorder = assemble(rig, clock, [*own, *sinks], in_line=fast)
+        statistics = Statistics(rig.period, window_from)
+        self._apart: Apart | None = None
+        self._figures = Figures(statistics, Keeper() if keep_columns else None)
+        if fast:
+            here, sentences = make_all(sinks)
+            here = [self._figures, *here]
+        else:
+            here, sentences, there = sorted_out(sinks)
+            self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn)
+        self._line, self._recorder = assemble(rig, clock, here, in_line=fast, apart=self._apart)
+        for sentence in sentences:
+            self._recorder.event(Event(0.0, "WARN", sentence))
         self._realtime_factor = math.nan
 
     def run(self) -> None:
@@ -134,7 +151,7 @@ class Session:
         began_ns = self._wall.now_ns()
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
-            with self.stop, self._realtime or nullcontext():
+            with self.stop, self._open_telemetry(), self._realtime or nullcontext():
                 self._say_where()
                 began_ns = self._wall.now_ns()
                 with line.backend:
@@ -153,6 +170,14 @@ class Session:
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.event(Event(recorder.t, "INFO", "amplifier at 0 V"))
             recorder.close()
+            if self._apart:
+                self._figures = self._apart.figures
+
+    def _open_telemetry(self) -> AbstractContextManager[None]:
+        """Let the telemetry process come up, before anything is armed and before we are real-time."""
+        if self._apart:
+            self._apart.open()
+        return nullcontext()
 
     def _run_line(self) -> None:
         line, recorder = self._line, self._recorder
@@ -173,10 +198,10 @@ class Session:
         """Return what there is, complete or not."""
         return Result(
             rig=self.rig,
-            summary=self._statistics.summary(self._realtime_factor),
-            columns=self._keeper.columns() if self._keeper else {},
-            events=tuple(self._keeper.events) if self._keeper else (),
-            dropped=self._recorder.dropped,
+            summary=self._figures.statistics.summary(self._realtime_factor),
+            columns=self._figures.columns(),
+            events=self._figures.events(),
+            dropped=self._apart.dropped if self._apart else self._recorder.dropped,
             link=getattr(self._line.backend, "counters", None),
             grants=tuple(self._realtime.grants) if self._realtime else (),
             host=self._host,
@@ -191,7 +216,7 @@ def run(
     duration: float | None = None,
     fast: bool = False,
     window_from: float = 0.0,
-    sinks: Sequence[Sink] = (),
+    sinks: Sequence[Sink | SinkMaker] = (),
 ) -> Result:
     """Run a rig and return its cycles as columns and its figures.
 
@@ -206,7 +231,10 @@ def run(
     window_from
         s, device time from which the summary's figures count.
     sinks
-        Who else looks on, such as a RerunSink.
+        Who else looks on: sinks, or better functions that make one, such as
+        ``partial(RerunSink, rig=view_of(rig), record=Path("run.rrd"), viewer="spawn")``. In real time a
+        function that can be pickled is called in the telemetry process, beside the loop; a sink that is there
+        already runs on a thread of this process, which costs the loop its punctuality.
 
     Returns
     -------

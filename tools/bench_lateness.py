@@ -12,6 +12,7 @@ import time
 from collections import deque
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.recorder import Sink
+    from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.wire.frame import Frame
 
 _SPREAD = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
@@ -192,11 +193,11 @@ def child(rate: float, seconds: float, record: bool) -> None:
     sys.stdout.buffer.write(np.array(_late_ns, np.int64).tobytes())
 
 
-def _recording(rig: Rig, file: Path) -> Sink:
+def _recording(rig: Rig, file: Path) -> SinkMaker:
     from dcmp_hil.telemetry.rerun_sink import RerunSink
     from dcmp_hil.telemetry.rig_view import view_of
 
-    return RerunSink(rig=view_of(rig), record=file, viewer="none")
+    return partial(RerunSink, rig=view_of(rig), record=file, viewer="none")
 
 
 # ---------------------------------------------------------------- what a period costs

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from dcmp_hil import __version__
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dcmp_hil.telemetry.recorder import Sink
+    from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.rerun_sink import Viewer
+    from dcmp_hil.telemetry.rig_view import RigView
 
 _FAULTS = "sim_backend.faults:with_faults"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
@@ -62,9 +66,10 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
         duration=options.duration,
         fast=options.fast,
         window_from=options.window_from,
-        sinks=_sinks(rig, options, folder),
+        sinks=_makers(rig, options, folder),
         keep_columns=folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options),
         stop=stop,
+        warn=console.warn,
     )
     ended_by = "duration"
     trip: TripError | None = None
@@ -85,20 +90,26 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
     return stop.exit_code
 
 
-def _sinks(rig: Rig, options: Options, folder: RunFolder | None) -> list[Sink]:
+def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
     """Everybody who looks on: the status line, and Rerun if there is a viewer or a recording."""
-    sinks: list[Sink] = [StatusLine(console.err, rig.period)]
+    makers: list[SinkMaker] = [partial(_status_line, rig.period)]
     record = options.record or (folder.recording if folder else None)
     viewer = _viewer(options)
     if record is not None or viewer != "none":
-        from dcmp_hil.telemetry.rerun_sink import RerunSink
         from dcmp_hil.telemetry.rig_view import view_of
 
-        sink = RerunSink(rig=view_of(rig), record=record, viewer=viewer)
-        for sentence in sink.warnings:
-            console.warn(sentence)
-        sinks.append(sink)
-    return sinks
+        makers.append(partial(_dashboard, view_of(rig), record, viewer))
+    return makers
+
+
+def _status_line(period: float) -> Sink:
+    return StatusLine(console.err, period)
+
+
+def _dashboard(view: RigView, record: Path | None, viewer: Viewer) -> Sink:
+    from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second, in the telemetry process
+
+    return RerunSink(rig=view, record=record, viewer=viewer)
 
 
 def _viewer(options: Options) -> Literal["spawn", "connect", "none"]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.telemetry.ring import FIELDS, NOWHERE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Reference
 
 _COLUMN = {name: index for index, name in enumerate(FIELDS)}
-_T = _COLUMN["t"]
-_AHEAD = [_COLUMN[name] for name in ("position_ahead", "velocity_ahead", "acceleration_ahead")]
+_REFERENCE = slice(_COLUMN["position_reference"], _COLUMN["acceleration_reference"] + 1)
+_SAME = 0.02  # of the delay: instants that differ by less are one
 
 
 class Block:
@@ -28,18 +28,10 @@ class Block:
     ----------
     rows
         Shape (n, len(FIELDS)), as `Ring.drain` gives them.
-    reference
-        Shape (n, 3): position rad, velocity rad/s and acceleration rad/s2 at each row's own `t`.
-    began
-        s, device time at which the trajectory began.
     """
 
-    def __init__(
-        self, rows: NDArray[np.float64], reference: NDArray[np.float64], began: float = -math.inf
-    ) -> None:
+    def __init__(self, rows: NDArray[np.float64]) -> None:
         self.rows = rows
-        self.reference = reference
-        self._began = began
 
     def __len__(self) -> int:
         """Count the periods."""
@@ -51,6 +43,11 @@ class Block:
         return column
 
     @property
+    def reference(self) -> NDArray[np.float64]:
+        """Position rad, velocity rad/s and acceleration rad/s2 at each row's own `t`, shape (n, 3)."""
+        return self.rows[:, _REFERENCE]
+
+    @property
     def tracking_error(self) -> NDArray[np.float64]:
         """Position minus reference at the same instant, rad: the true position where it is known.
 
@@ -58,13 +55,13 @@ class Block:
         """
         true = self["position_true"]
         position = np.where(np.isnan(true), self["position"], true)
-        error: NDArray[np.float64] = position - self.reference[:, 0]
-        error[self["t"] < self._began] = np.nan
+        error: NDArray[np.float64] = position - self["position_reference"]
+        error[self["t"] < self["began"]] = np.nan
         return error
 
 
 class Aligner:
-    """Finds the reference at each sample's own instant.
+    """Finds the reference at each sample's own instant, period by period.
 
     A cycle holds the reference at t + delay; the one at t is that of the cycle `delay` earlier. Where
     that cycle is missing (the first ones, lost samples) the trajectory is asked.
@@ -74,7 +71,7 @@ class Aligner:
     at
         The trajectory.
     delay
-        s, from a sample to the instant at which its command takes effect.
+        s, from a sample to the instant at which its command takes effect: 0 or one period.
     began
         When the trajectory began, s; infinity before it did.
     """
@@ -86,24 +83,30 @@ class Aligner:
         began: Callable[[], float] = lambda: -math.inf,
     ) -> None:
         self._at = at
-        self._began = began
         self._delay = delay
-        self._last = np.full((1, len(FIELDS)), np.nan)
+        self._tolerance = _SAME * delay
+        self._began = began
+        self._since = began()
+        self._due = math.nan  # the instant that the cycle before looked ahead to
+        self._then = NOWHERE
 
-    def block(self, rows: NDArray[np.float64]) -> Block:
-        """Make a block of rows that follow those of the call before.
+    def now(self, t: float, ahead: Reference) -> tuple[Reference, float]:
+        """Return the reference at device time `t`, and when the trajectory began.
 
-        The delay is 0 or one period, so the row before, or the row itself, is the one wanted.
+        Parameters
+        ----------
+        t
+            s, of the sample after that of the call before.
+        ahead
+            The reference at t + delay.
         """
         began = self._began()
         if self._delay == 0.0:
-            return Block(rows, rows[:, _AHEAD], began)
-        earlier = np.concatenate((self._last, rows[:-1]))
-        reference = earlier[:, _AHEAD]
-        missed = ~(np.abs(earlier[:, _T] + self._delay - rows[:, _T]) < 0.02 * self._delay)
-        missed |= (earlier[:, _T] < began) & (rows[:, _T] >= began)  # there it jumps to where the arm is
-        for k in np.flatnonzero(missed):
-            reference[k] = self._at(float(rows[k, _T]))
-        if len(rows):
-            self._last = rows[-1:].copy()
-        return Block(rows, reference, began)
+            return ahead, began
+        at_t = self._then
+        off = t - self._due
+        if not -self._tolerance < off < self._tolerance or began != self._since:
+            at_t = self._at(t)  # where it begins it jumps to where the arm is
+            self._since = began
+        self._due, self._then = t + self._delay, ahead
+        return at_t, began

@@ -1,40 +1,25 @@
-"""From the loop to everybody who looks on: a ring, then blocks to each sink, in line or from a thread."""
+"""From the loop to everybody who looks on: rows into a ring, events beside it, and nothing that waits."""
 
 from __future__ import annotations
 
-import threading
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
+from dcmp_hil.telemetry.audience import Audience, Service, Sink
 from dcmp_hil.telemetry.ring import Ring
-from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.telemetry.block import Aligner, Block
-    from dcmp_hil.values import Cycle, Truth
+    from dcmp_hil.telemetry.apart import Apart
+    from dcmp_hil.telemetry.block import Aligner
+    from dcmp_hil.values import Cycle, Event, Truth
+
+__all__ = ["Recorder", "Sink"]
 
 _IN_LINE = 4096  # rows a block in virtual time, where nobody waits
-_CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before the thread loses any
-_INTERVAL = 0.1  # s between two blocks from the thread
+_CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
 _LAST_BLOCK = 2.0  # s that the end of a run waits for the thread
-
-
-class Sink(Protocol):
-    """Something that wants to see the run."""
-
-    def block(self, block: Block) -> None:
-        """Take consecutive periods."""
-        ...
-
-    def event(self, event: Event) -> None:
-        """Take an event."""
-        ...
-
-    def close(self) -> None:
-        """Finish; nothing comes after."""
-        ...
 
 
 class Recorder:
@@ -47,12 +32,15 @@ class Recorder:
     aligner
         Finds the reference at each sample's own instant.
     sinks
-        Who looks on. One that raises is dropped, and an event says so; the run goes on.
+        Who looks on from this process. One that raises is dropped, and an event says so; the run goes on.
     recent
         Cycles kept for the black box.
     in_line
         True in virtual time: blocks are handed on by `record` itself, so that none is ever lost and runs
-        repeat to the bit. False: a thread does it, and rows are dropped and counted if it falls behind.
+        repeat to the bit. False: a thread does it, and rows are dropped and counted if it falls behind; no
+        sinks, no thread.
+    apart
+        Who looks on from a process of its own.
     """
 
     def __init__(
@@ -63,33 +51,36 @@ class Recorder:
         *,
         recent: int,
         in_line: bool,
+        apart: Apart | None = None,
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
-        self._ring = Ring(_CAPACITY)
+        self._apart = apart
+        self._ring = apart.ring if apart else Ring(_CAPACITY)
+        self._push = self._ring.push
         self._truth = truth
-        self._aligner = aligner
-        self._sinks = list(sinks)
-        self._events: deque[Event] = deque(maxlen=10_000)
+        self._now = aligner.now
+        self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event)
         self._untold = 0
         self._in_line = in_line
-        self._done = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="telemetry", daemon=True)
-        if not in_line:
-            self._thread.start()
+        self._service = Service(self._audience) if sinks and not in_line else None
+        self._closed = False
 
     def record(self, cycle: Cycle) -> None:
         """Take one period."""
-        self._ring.push(cycle, self._truth())
+        now, began = self._now(cycle.sample.t, cycle.reference)
+        self._push(cycle, self._truth(), now, began)
         self.recent.append(cycle)
         if self._in_line:
             self._untold += 1
             if self._untold == _IN_LINE:
                 self._untold = 0
-                self._hand_on()
+                self._audience.hand_on()
 
     def event(self, event: Event) -> None:
         """Take an event."""
-        self._events.append(event)
+        self._audience.event(event)
+        if self._apart:
+            self._apart.event(event)
 
     @property
     def t(self) -> float:
@@ -99,44 +90,16 @@ class Recorder:
     @property
     def dropped(self) -> int:
         """Rows lost because the sinks were too slow; after `close`, those never handed on as well."""
-        return self._ring.dropped + (len(self._ring) if self._done.is_set() else 0)
+        ring = self._audience.ring
+        return ring.dropped + (len(ring) if self._closed else 0)
 
     def close(self) -> None:
         """Hand on what is left and close the sinks; waits for a stuck sink for 2 s at most."""
+        self._closed = True
         if self._in_line:
-            self._finish()
+            self._audience.finish()
             return
-        self._done.set()
-        self._thread.join(_LAST_BLOCK)
-
-    def _serve(self) -> None:
-        while not self._done.wait(_INTERVAL):
-            self._hand_on()
-        self._finish()
-
-    def _finish(self) -> None:
-        self._hand_on()
-        self._hand_on_events()  # a sink that gave up at the last block is news as well
-        while self._sinks:  # the last one first, so that those before it hear if it gives up
-            self._tell(lambda sink: sink.close(), [self._sinks.pop()])
-            self._hand_on_events()
-
-    def _hand_on_events(self) -> None:
-        while self._events:
-            event = self._events.popleft()
-            self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
-
-    def _hand_on(self) -> None:
-        self._hand_on_events()
-        rows = self._ring.drain()
-        if len(rows):
-            block = self._aligner.block(rows)
-            self._tell(lambda sink: sink.block(block))
-
-    def _tell(self, call: Callable[[Sink], None], sinks: Sequence[Sink] | None = None) -> None:
-        for sink in tuple(self._sinks if sinks is None else sinks):
-            try:
-                call(sink)
-            except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
-                self._sinks = [other for other in self._sinks if other is not sink]
-                self.event(Event(self.t, "WARN", f"{type(sink).__name__} gave up and was dropped: {error}"))
+        if self._service:
+            self._service.finish(_LAST_BLOCK)
+        if self._apart:
+            self._apart.close()

@@ -216,7 +216,7 @@ def _log_styles(plots: dict[str, list[Signal]], stream: rr.RecordingStream) -> N
 
 def _warm_up(rig: RigView) -> None:
     """Make the calls of a block for nobody: the first ones take 80 ms, and the loop would wait for them."""
-    frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))), np.zeros((2, 3)))
+    frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
     frames.choose_lines(block)
     stream = rr.RecordingStream("warm-up")
     _send([*frames.of_block(block), frames.of_event(Event(0.0, "INFO", ""))], stream)

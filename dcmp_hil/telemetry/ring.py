@@ -1,13 +1,18 @@
-"""A ring of fixed rows between the loop, which never waits, and whoever drains it."""
+"""A ring of fixed rows between the loop, which never waits, and whoever looks on, here or elsewhere."""
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.values import Reference
+
 if TYPE_CHECKING:
+    import mmap
+
     from numpy.typing import NDArray
 
     from dcmp_hil.values import Cycle, Truth
@@ -19,40 +24,70 @@ FIELDS = (
     *("voltage_demand", "voltage_sent"),
     *("period", "lateness", "compute"),
     *("position_true", "velocity_true", "disturbance_true"),
+    *("position_reference", "velocity_reference", "acceleration_reference"),  # at t
+    "began",  # device time at which the trajectory began; infinity before it did
 )
-"""Columns of a row, in SI units, in the order in which a Cycle and its Truth are laid out flat."""
+"""Columns of a row, in SI units, in the order in which a Cycle and what goes with it are laid out flat."""
 
-_ROW = struct.Struct(f"{len(FIELDS)}d")
-_pack = _ROW.pack_into
+NOWHERE = Reference(math.nan, math.nan, math.nan)
+_NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
+_COUNT = struct.Struct("q")  # in native form, which is one store of the CPU
+_HEAD = 64
+_pack, _count = _NUMBERED.pack_into, _COUNT.pack_into
+
+
+def size_of(capacity: int) -> int:
+    """Return the bytes that a ring of so many rows takes."""
+    return _HEAD + capacity * _NUMBERED.size
 
 
 class Ring:
-    """Single producer, single consumer; the oldest rows are overwritten when nobody drains.
+    """One producer, any number of consumers; the oldest rows are overwritten, whoever has read them.
+
+    Every Ring over the same memory has a reading position of its own; one of them alone may push.
 
     Parameters
     ----------
     capacity
         Rows kept; the producer may be this far ahead before rows are lost.
+    memory
+        Of `size_of(capacity)` bytes, zeros at first; None takes some that nobody shares.
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, memory: mmap.mmap | bytearray | None = None) -> None:
         self.capacity = capacity
-        self.dropped = 0  # rows overwritten before they were read
-        self._bytes = bytearray(capacity * _ROW.size)
-        self._rows = np.frombuffer(self._bytes, np.float64).reshape(capacity, len(FIELDS))
+        self.memory = bytearray(size_of(capacity)) if memory is None else memory
+        self.dropped = 0  # rows overwritten before they were read here
+        self.position = 0  # the next row to read
+        self._rows = np.frombuffer(self.memory, np.float64, offset=_HEAD).reshape(capacity, -1)
         self._written = 0
-        self._read = 0
 
-    def push(self, cycle: Cycle, truth: Truth) -> None:
-        """Write one row; constant time, never blocks."""
+    def push(self, cycle: Cycle, truth: Truth, now: Reference = NOWHERE, began: float = -math.inf) -> None:
+        """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
         sample, estimate, reference, demand, voltage, timing = cycle
-        row = self._written % self.capacity * _ROW.size
-        _pack(self._bytes, row, *sample, *estimate, *reference, demand, voltage, *timing, *truth)
-        self._written += 1
+        k = self._written
+        row = _HEAD + k % self.capacity * _NUMBERED.size
+        _pack(
+            self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth, *now, began
+        )  # fmt: skip
+        self._written = k + 1
+        _count(self.memory, 0, k + 1)
+
+    @property
+    def written(self) -> int:
+        """Rows written so far."""
+        count: int = _COUNT.unpack_from(self.memory)[0]
+        return count
+
+    @property
+    def newest(self) -> float:
+        """Device time of the newest row, s; 0 before the first."""
+        written = self.written
+        return float(self._rows[(written - 1) % self.capacity, 1]) if written else 0.0
 
     def __len__(self) -> int:
         """Rows waiting, those already lost included."""
-        return self._written - self._read
+        return self.written - self.position
 
     def drain(self) -> NDArray[np.float64]:
         """Take every row waiting, oldest first.
@@ -62,10 +97,12 @@ class Ring:
         ndarray, shape (n, len(FIELDS))
             A copy. Rows that the producer overwrote, even during the copy, are left out and counted.
         """
-        written = self._written
-        first = max(self._read, written - self.capacity)
-        rows = self._rows[np.arange(first, written) % self.capacity]
-        overtaken = max(0, self._written - self.capacity - first)  # the producer went on meanwhile
-        self.dropped += first - self._read + min(overtaken, len(rows))
-        self._read = written
-        return rows[overtaken:]
+        written = self.written
+        first = max(self.position, written - self.capacity)
+        numbers = np.arange(first, written)
+        slots = numbers % self.capacity
+        rows = self._rows[slots, 1:]
+        whole = self._rows[slots, 0] == numbers  # after the copy: whoever overwrites a row numbers it first
+        self.dropped += written - self.position - int(np.count_nonzero(whole))
+        self.position = written
+        return rows if whole.all() else rows[whole]

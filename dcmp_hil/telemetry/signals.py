@@ -99,3 +99,8 @@ def by_plot() -> dict[str, list[Signal]]:
     for signal in SIGNALS:
         plots.setdefault(signal.plot, []).append(signal)
     return plots
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the columns, in their order."""
+    return ("time_s", *(signal.column for signal in SIGNALS))

@@ -52,16 +52,14 @@ def test_run_keeps_what_was_recorded_when_signalled(
     assert (tmp_path / "figures.json").exists()
 
 
-def test_recording_is_readable_when_killed(tmp_path: Path) -> None:
-    from rerun import error_utils
+def test_recording_is_whole_when_killed(tmp_path: Path) -> None:
     from rerun.chunk import RrdReader
 
     process = _start(tmp_path, "--duration", "0")
     folder = _wait_until_it_records(tmp_path)
     process.kill()
-    process.communicate(timeout=_BOUND)
-    with pytest.warns(error_utils.RerunWarning, match="no footer"):
-        chunks = list(RrdReader(folder / "run.rrd").stream())
+    process.communicate(timeout=_BOUND)  # until the telemetry process has left, too
+    chunks = list(RrdReader(folder / "run.rrd").stream())  # no warning that it has no footer
     assert any("position_rad" in str(chunk.entity_path) for chunk in chunks)
 
 

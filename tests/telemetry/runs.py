@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.telemetry.block import Aligner
+from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.rig_view import RigView
 from dcmp_hil.telemetry.ring import Ring
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.recorder import Sink
 
 T = 1e-3
@@ -70,9 +69,10 @@ def blocks(periods: int, *, known: bool = True, rows: int = 100) -> list[Block]:
     ring, aligner = Ring(4096), Aligner(at, T)
     made = []
     for k in range(periods):
-        ring.push(cycle(k), truth(k) if known else UNKNOWN_TRUTH)
+        now, began = aligner.now(cycle(k).sample.t, cycle(k).reference)
+        ring.push(cycle(k), truth(k) if known else UNKNOWN_TRUTH, now, began)
         if len(ring) == rows or k == periods - 1:
-            made.append(aligner.block(ring.drain()))
+            made.append(Block(ring.drain()))
     return made
 
 

@@ -46,10 +46,12 @@ def _figures(
     window: tuple[float, float] = (0.0, math.inf),
 ) -> Summary:
     rows = np.column_stack([columns[name] for name in FIELDS])
+    rows[:, FIELDS.index("position_reference") : FIELDS.index("acceleration_reference") + 1] = reference
+    rows[:, FIELDS.index("began")] = -math.inf
     statistics = Statistics(_T, *window)
     edges = [0, *sorted(min(cut, len(rows)) for cut in cuts), len(rows)]
     for first, last in itertools.pairwise(edges):
-        statistics.block(Block(rows[first:last], reference[first:last]))
+        statistics.block(Block(rows[first:last]))
     return statistics.summary(7.0)
 
 

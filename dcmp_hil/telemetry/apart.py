@@ -1,0 +1,240 @@
+"""Telemetry in a process of its own: the loop shares the interpreter lock with nobody.
+
+The loop writes rows into shared memory, and events into a socket that never blocks. The process writes down
+how far it has come ten times a second; where it ends too early, or does not answer, what is left in the ring
+is worked out here, so that the figures miss only what was overwritten meanwhile.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+from collections import deque
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.audience import Audience
+from dcmp_hil.telemetry.child import DONE, FIGURES, MESSAGE, UP, Setup, State
+from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.ring import Ring, size_of
+from dcmp_hil.telemetry.shared import Ledger, mapped, reserve
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dcmp_hil.telemetry.statistics import Statistics
+
+_CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
+_COMING_UP = 30.0  # s; nothing is armed yet
+_ANSWER = 1.5  # s for the figures, at the end of a run
+_LEAVING = 2.0  # s that the end of a run takes at most
+_LAST = 12.0  # s that the end of this process takes at most, for a window that is still opening
+_EVENTS = 10_000
+_LONGEST = 10_000  # characters of an event's text that are sent
+_CODE = """
+import sys
+sys.path[:] = {path!r}
+from dcmp_hil.telemetry.child import main
+main({connection}, {setup})
+"""
+
+
+class Apart:
+    """The parent's side.
+
+    Parameters
+    ----------
+    statistics
+        Not begun.
+    keep
+        Whether to keep columns and events.
+    sinks
+        Functions that make the other sinks there, pickled.
+    warn
+        Told, in a sentence, what the run goes on without.
+
+    Attributes
+    ----------
+    ring
+        For the loop to write to.
+    figures
+        What the run came to, once closed.
+    dropped
+        Rows that are in no figure, once closed.
+    pid
+        Of the process, once open; None if there is none.
+    """
+
+    def __init__(
+        self,
+        statistics: Statistics,
+        *,
+        keep: bool,
+        sinks: Sequence[bytes] = (),
+        warn: Callable[[str], None] | None = None,
+    ) -> None:
+        self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
+        ring, ledger, self._setup, *kept = self._files
+        self._kept = (kept[0], kept[1]) if keep else None
+        self._ledger = Ledger(ledger)
+        self._warn_user = warn
+        self._told: deque[Event] = deque(maxlen=_EVENTS)
+        self._untold: deque[Event] = deque(maxlen=_EVENTS)
+        self._events = 0  # told or not
+        self._channel: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self.ring = Ring(_CAPACITY, mapped(ring, size_of(_CAPACITY)))
+        self.figures = Figures(statistics, SharedKeeper(self._kept) if self._kept else None)
+        self.dropped = 0
+        self.pid: int | None = None
+        setup = Setup(_CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks))
+        os.write(self._setup, pickle.dumps(setup))
+
+    def open(self) -> None:
+        """Start the process and wait until its sinks are made, for 30 s at most.
+
+        Raises
+        ------
+        ConfigError
+            If a sink raises it.
+        """
+        try:
+            process, channel = self._start()
+        except OSError as error:
+            self._go_without(f"could not be started ({error})")
+            return
+        answer = _hear(channel, _COMING_UP)
+        if answer == UP:
+            self._process, self._channel, self.pid = process, channel, process.pid
+            self._send_events()
+            return
+        channel.close()
+        _end(process, 0.0)
+        if answer:
+            raise ConfigError(*pickle.loads(answer))  # noqa: S301 - written by our own child
+        self._go_without("did not come up")
+
+    def event(self, event: Event) -> None:
+        """Send an event, or keep it until there is room; never blocks."""
+        self._events += 1
+        self._told.append(event)
+        self._untold.append(event)
+        self._send_events()
+
+    def close(self) -> None:
+        """Have the rest worked out and the sinks closed; take over what the process cannot; 2 s at most."""
+        sentence = ""
+        if self._process and self._channel:
+            with self._channel:
+                sentence = self._finish(self._process, self._channel)
+            self._process = self._channel = None
+        self._take_over()
+        if sentence:
+            lost = f"{self.dropped} periods are in no figure" if self.dropped else "the figures are complete"
+            self._warn(
+                self.figures.event, f"The telemetry process {sentence}: {lost}; what it recorded ends early."
+            )
+
+    # ---------------------------------------------------------------- the process
+
+    def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket]:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            code = _CODE.format(path=sys.path, connection=theirs.fileno(), setup=self._setup)
+            try:
+                process = subprocess.Popen(  # noqa: S603 - our own code
+                    [sys.executable, "-c", code],
+                    pass_fds=[theirs.fileno(), *self._files],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                )
+            except OSError:
+                ours.close()
+                raise
+        return process, ours
+
+    def _finish(self, process: subprocess.Popen[bytes], channel: socket.socket) -> str:
+        """Let the process finish; return what went wrong."""
+        clock = MonotonicClock()
+        end_ns = clock.now_ns() + int(_LEAVING * 1e9)
+        with suppress(OSError):
+            self._send_events()
+            channel.shutdown(socket.SHUT_WR)
+        if _hear(channel, _ANSWER) != FIGURES:
+            return _how(_end(process, 0.0))
+        if _hear(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
+            if process.poll() is not None:
+                return _how(process.returncode)
+            atexit.register(_end, process, _LAST)  # a window that is still opening, or a disk that is slow
+            return ""
+        _end(process, _LEAVING)
+        return ""
+
+    def _send_events(self) -> None:
+        while self._untold and self._channel:
+            t, level, text = self._untold[0]
+            try:
+                self._channel.send(pickle.dumps((t, level, text[:_LONGEST])), socket.MSG_DONTWAIT)
+            except OSError:  # no room, or nobody: what nobody takes is taken over at the end
+                return
+            self._untold.popleft()
+
+    # ---------------------------------------------------------------- without it
+
+    def _take_over(self) -> None:
+        """Go on where the process stopped writing down how far it was: at the very end, if all is well."""
+        state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths())
+        keeper = SharedKeeper(self._kept, state.kept) if self._kept else None
+        self.figures = Figures(state.statistics, keeper)
+        ring = Ring(self.ring.capacity, self.ring.memory)
+        ring.position, ring.dropped = state.position, state.dropped
+        audience = Audience(ring, [self.figures])
+        missing = min(self._events - state.events, len(self._told))
+        for event in list(self._told)[len(self._told) - missing :]:
+            audience.event(event)
+        audience.hand_on()
+        self.dropped = ring.dropped
+
+    def _go_without(self, why: str) -> None:
+        self._warn(
+            self.event,
+            f"The telemetry process {why}: no viewer, no recording, no status line, and figures of the last "
+            f"{_CAPACITY} periods only; the run goes on.",
+        )
+
+    def _warn(self, take: Callable[[Event], None], sentence: str) -> None:
+        take(Event(self.ring.newest, "WARN", sentence))
+        if self._warn_user:
+            self._warn_user(sentence)
+
+
+def _hear(channel: socket.socket, within: float) -> bytes:
+    """Return the next message; nothing if there is none in time, or never will be."""
+    channel.settimeout(max(within, 1e-3))
+    try:
+        return channel.recv(MESSAGE)
+    except OSError:
+        return b""
+
+
+def _end(process: subprocess.Popen[bytes], within: float) -> int:
+    """Wait for a process so many seconds, then kill it; return how it ended."""
+    with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
+        return process.wait(within)
+    process.kill()
+    return process.wait()
+
+
+def _how(code: int) -> str:
+    """Say how a process ended."""
+    if code == 0:
+        return "left"
+    return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"failed (exit code {code})"

@@ -1,0 +1,118 @@
+"""Whoever looks on: blocks and events, in order, to each sink; one that raises is dropped and told of."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from dcmp_hil.telemetry.block import Block
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dcmp_hil.telemetry.ring import Ring
+
+INTERVAL = 0.1  # s between two blocks in real time
+_WAITING = 10_000  # events
+
+
+@runtime_checkable
+class Sink(Protocol):
+    """Something that wants to see the run."""
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        ...
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        ...
+
+    def close(self) -> None:
+        """Finish; nothing comes after."""
+        ...
+
+
+class Audience:
+    """Hands on what waits in a ring, and events, when it is told to.
+
+    Parameters
+    ----------
+    ring
+        Nobody else reads from this one; others over the same memory may.
+    sinks
+        Who looks on.
+    tell
+        Takes the event that a sink gave up; None hands it to the other sinks.
+    """
+
+    def __init__(
+        self, ring: Ring, sinks: Sequence[Sink], tell: Callable[[Event], None] | None = None
+    ) -> None:
+        self.ring = ring
+        self._sinks = list(sinks)
+        self._events: deque[Event] = deque(maxlen=_WAITING)
+        self._report = tell or self._events.append
+
+    def event(self, event: Event) -> None:
+        """Put an event behind those that wait."""
+        self._events.append(event)
+
+    def hand_on(self) -> None:
+        """Hand on the events that wait, then the rows."""
+        self._hand_on_events()
+        rows = self.ring.drain()
+        if len(rows):
+            block = Block(rows)
+            self._tell(lambda sink: sink.block(block))
+
+    def finish(self) -> None:
+        """Hand on what is left and close the sinks."""
+        self.hand_on()
+        self._hand_on_events()  # a sink that gave up at the last block is news as well
+        while self._sinks:  # the last one first, so that those before it hear if it gives up
+            self._tell(lambda sink: sink.close(), [self._sinks.pop()])
+            self._hand_on_events()
+
+    def _hand_on_events(self) -> None:
+        while self._events:
+            event = self._events.popleft()
+            self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
+
+    def _tell(self, call: Callable[[Sink], None], sinks: Sequence[Sink] | None = None) -> None:
+        for sink in tuple(self._sinks if sinks is None else sinks):
+            try:
+                call(sink)
+            except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
+                self._sinks = [other for other in self._sinks if other is not sink]
+                sentence = f"{type(sink).__name__} gave up and was dropped: {error}"
+                self._report(Event(self.ring.newest, "WARN", sentence))
+
+
+class Service:
+    """A thread that hands on ten times a second, until it is told to finish.
+
+    Parameters
+    ----------
+    audience
+        Nobody else tells it to hand on.
+    """
+
+    def __init__(self, audience: Audience) -> None:
+        self.audience = audience
+        self.finishing = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="telemetry", daemon=True)
+        self._thread.start()
+
+    def finish(self, within: float) -> bool:
+        """Finish; wait for it so many seconds, and tell whether that was enough."""
+        self.finishing.set()
+        self._thread.join(within)
+        return not self._thread.is_alive()
+
+    def _serve(self) -> None:
+        while not self.finishing.wait(INTERVAL):
+            self.audience.hand_on()
+        self.audience.finish()

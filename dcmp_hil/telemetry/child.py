@@ -1,0 +1,172 @@
+"""The process that looks on: drains the ring, feeds the sinks, outlives whoever started it by a moment.
+
+The sinks that make a run's figures have the main thread; every other one has a thread of its own, so that a
+viewer that takes nothing delays nobody else. It leaves by itself when its parent says so, or is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import signal
+import socket
+import sys
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
+from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.outlet import THREAD
+from dcmp_hil.telemetry.ring import Ring, size_of
+from dcmp_hil.telemetry.shared import Ledger, mapped
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.statistics import Statistics
+
+UP, FIGURES, DONE = b"up", b"figures", b"done"
+MESSAGE = 1 << 16  # bytes, the longest
+_IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
+_CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What the process needs to know.
+
+    Parameters
+    ----------
+    capacity
+        Of the ring.
+    ring, ledger, kept
+        Descriptors: of the ring's memory, of the ledger, of the two logs of a SharedKeeper if there is one.
+    statistics
+        Not begun.
+    sinks
+        Functions that make the others, pickled.
+    """
+
+    capacity: int
+    ring: int
+    ledger: int
+    kept: tuple[int, int] | None
+    statistics: Statistics
+    sinks: tuple[bytes, ...]
+
+
+class State(NamedTuple):
+    """How far the process has come, for whoever has to go on in its place."""
+
+    position: int  # of the ring
+    dropped: int  # rows
+    events: int  # taken from the parent
+    statistics: Statistics
+    kept: Lengths
+
+
+def main(connection: int, setup: int) -> None:
+    """Serve, then leave; `connection` and `setup` are descriptors of a socket and of a pickled Setup."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # the parent decides
+        signal.signal(number, signal.SIG_IGN)
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    parent = os.getppid()
+    data = os.pread(setup, os.fstat(setup).st_size, 0)
+    with socket.socket(fileno=connection) as channel:
+        _Watcher(pickle.loads(data), channel, parent).serve()  # noqa: S301 - written by our own parent
+    if any(thread.name == THREAD for thread in threading.enumerate()):
+        sys.stderr.flush()
+        os._exit(0)  # Rerun's own ending waits for a frozen viewer for ever
+
+
+class _Watcher:
+    def __init__(self, setup: Setup, channel: socket.socket, parent: int) -> None:
+        self._setup, self._channel, self._parent = setup, channel, parent
+        self._keeper = SharedKeeper(setup.kept) if setup.kept else None
+        self._figures = Figures(setup.statistics, self._keeper)
+        self._ring = Ring(setup.capacity, mapped(setup.ring, size_of(setup.capacity)))
+        self._audience = Audience(self._ring, [self._figures], self._tell)
+        self._ledger = Ledger(setup.ledger)
+        self._services: list[Service] = []
+        self._taken = 0  # events from the parent
+
+    def serve(self) -> None:
+        """Make the sinks, say so, and hand on until the end."""
+        try:
+            warnings = self._make_sinks()
+        except ConfigError as error:
+            self._say(pickle.dumps(error.faults))
+            return
+        self._say(UP)
+        for sentence in warnings:
+            self._tell(Event(0.0, "WARN", sentence))
+        with select.epoll() as waiting:
+            waiting.register(self._channel, select.EPOLLIN)
+            while True:
+                waiting.poll(INTERVAL)
+                ended = self._take_events() or os.getppid() != self._parent
+                self._hand_on()
+                if ended:
+                    break
+        self._say(FIGURES)
+        self._close()
+        self._hand_on()
+        self._say(DONE)
+
+    def _make_sinks(self) -> list[str]:
+        warnings: list[str] = []
+        for data in self._setup.sinks:
+            try:
+                sink: Sink = pickle.loads(data)()  # noqa: S301 - written by our own parent
+            except ConfigError:
+                raise
+            except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
+                warnings.append(f"A sink could not be made: {type(error).__name__}: {error}")
+                continue
+            warnings += getattr(sink, "warnings", ())
+            ring = Ring(self._ring.capacity, self._ring.memory)
+            self._services.append(Service(Audience(ring, [sink], self._tell)))
+        return warnings
+
+    def _tell(self, event: Event) -> None:
+        for audience in (self._audience, *(service.audience for service in self._services)):
+            audience.event(event)
+
+    def _take_events(self) -> bool:
+        """Take what the parent sent; tell whether that was the last."""
+        while True:
+            try:
+                message = self._channel.recv(MESSAGE, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return False
+            except OSError:
+                return True
+            if not message:  # the parent closed its side
+                return True
+            self._taken += 1
+            self._tell(Event(*pickle.loads(message)))  # noqa: S301 - written by our own parent
+
+    def _hand_on(self) -> None:
+        self._audience.hand_on()
+        lengths = self._keeper.lengths if self._keeper else Lengths()
+        self._ledger.write(
+            State(self._ring.position, self._ring.dropped, self._taken, self._figures.statistics, lengths)
+        )
+
+    def _close(self) -> None:
+        """Close the other sinks, the last one first; one that takes its time is waited for at the end."""
+        clock = MonotonicClock()
+        end_ns = clock.now_ns() + int(_CLOSING * 1e9)
+        late = [service for service in reversed(self._services) if not service.finish(_IN_TURN)]
+        for service in late:
+            service.finish(max(0, end_ns - clock.now_ns()) * 1e-9)
+
+    def _say(self, message: bytes) -> None:
+        with suppress(OSError):  # the parent is gone
+            self._channel.send(message)

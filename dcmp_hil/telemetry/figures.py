@@ -1,0 +1,112 @@
+"""What a run comes to: its figures, and its columns and events where they are kept."""
+
+from __future__ import annotations
+
+import pickle
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dcmp_hil.telemetry.shared import Log
+from dcmp_hil.telemetry.signals import columns, names
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.keeper import Keeper
+    from dcmp_hil.telemetry.statistics import Statistics
+
+
+class Figures:
+    """A sink of sinks.
+
+    Parameters
+    ----------
+    statistics
+        Makes the summary.
+    keeper
+        Keeps columns and events; None keeps nothing, and memory stays bounded.
+    """
+
+    def __init__(self, statistics: Statistics, keeper: Keeper | SharedKeeper | None) -> None:
+        self.statistics = statistics
+        self.keeper = keeper
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        self.statistics.block(block)
+        if self.keeper:
+            self.keeper.block(block)
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        if self.keeper:
+            self.keeper.event(event)
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return every signal kept, shape (periods,), by column name."""
+        return self.keeper.columns() if self.keeper else {}
+
+    def events(self) -> tuple[Event, ...]:
+        """Return the events kept."""
+        return tuple(self.keeper.events) if self.keeper else ()
+
+
+class Lengths(NamedTuple):
+    """How much of the files of a SharedKeeper counts, bytes."""
+
+    columns: int = 0
+    events: int = 0
+
+
+class SharedKeeper:
+    """A Keeper whose memory another process shares, and can go on with where this one ended.
+
+    Parameters
+    ----------
+    files
+        For columns and for events, from `reserve`.
+    lengths
+        What is in them already.
+    """
+
+    def __init__(self, files: tuple[int, int], lengths: Lengths | None = None) -> None:
+        lengths = lengths or Lengths()
+        self._columns, self._events = Log(files[0], lengths.columns), Log(files[1], lengths.events)
+
+    @property
+    def lengths(self) -> Lengths:
+        """How much counts by now."""
+        return Lengths(self._columns.length, self._events.length)
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        self._columns.append(np.stack(list(columns(block).values()), axis=1).tobytes())
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        data = pickle.dumps(tuple(event))
+        self._events.append(len(data).to_bytes(4, "little") + data)
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return every signal, shape (periods,), by column name."""
+        table = np.frombuffer(self._columns.read(), np.float64).reshape(-1, len(names()))
+        return {name: table[:, k].copy() for k, name in enumerate(names())} if len(table) else {}
+
+    @property
+    def events(self) -> list[Event]:
+        """What happened, in order."""
+        data, place, found = self._events.read(), 0, []
+        while place < len(data):
+            begin = place + 4
+            place = begin + int.from_bytes(data[place:begin], "little")
+            found.append(Event(*pickle.loads(data[begin:place])))  # noqa: S301 - written by our own child
+        return found
