@@ -61,6 +61,8 @@ class Result:
         Late periods of the whole run, by what `timing.overrun` calls late.
     outliers
         Samples left out because no arm can have been where they say.
+    troubles
+        Its first hundred warnings and errors, with their time; kept where events are not, too.
     """
 
     rig: Rig
@@ -73,6 +75,7 @@ class Result:
     host: dict[str, Any] = field(default_factory=dict)
     overruns: int = 0
     outliers: int = 0
+    troubles: tuple[str, ...] = ()
 
 
 class Session:
@@ -207,6 +210,7 @@ class Session:
             host=self._host,
             overruns=self._line.overruns.count,
             outliers=self._line.outliers.count,
+            troubles=tuple(self._figures.troubles),
         )
 
 

@@ -147,6 +147,7 @@ def _conclude(
         "link": None if result.link is None else asdict(result.link),
         "overruns": result.overruns,
         "outliers": result.outliers,
+        "troubles": result.troubles,
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
         "host": result.host,
     }

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
 _COMING_UP = 30.0  # s; nothing is armed yet
 _ANSWER = 1.5  # s for the figures, at the end of a run
+_REAPING = 0.2  # s
 _LEAVING = 2.0  # s that the end of a run takes at most
 _LAST = 12.0  # s that the end of this process takes at most, for a window that is still opening
 _EVENTS = 10_000
@@ -169,7 +170,10 @@ class Apart:
             self._send_events()
             channel.shutdown(socket.SHUT_WR)
         if _hear(channel, _ANSWER) != FIGURES:
-            return _how(_end(process, 0.0))
+            with suppress(subprocess.TimeoutExpired):  # where nobody listens any more it has ended already
+                return _how(process.wait(_REAPING))
+            _end(process, 0.0)
+            return f"did not answer for {_ANSWER} s"
         if _hear(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
             if process.poll() is not None:
                 return _how(process.returncode)
@@ -191,9 +195,10 @@ class Apart:
 
     def _take_over(self) -> None:
         """Go on where the process stopped writing down how far it was: at the very end, if all is well."""
-        state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths())
+        state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths(), [])
         keeper = SharedKeeper(self._kept, state.kept) if self._kept else None
         self.figures = Figures(state.statistics, keeper)
+        self.figures.troubles += state.troubles
         ring = Ring(self.ring.capacity, self.ring.memory)
         ring.position, ring.dropped = state.position, state.dropped
         audience = Audience(ring, [self.figures])
@@ -223,6 +228,8 @@ def _hear(channel: socket.socket, within: float) -> bytes:
         return channel.recv(MESSAGE)
     except OSError:
         return b""
+    finally:
+        channel.setblocking(False)  # a socket with a timeout waits even where it is told not to
 
 
 def _end(process: subprocess.Popen[bytes], within: float) -> int:

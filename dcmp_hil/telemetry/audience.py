@@ -55,6 +55,7 @@ class Audience:
         self._sinks = list(sinks)
         self._events: deque[Event] = deque(maxlen=_WAITING)
         self._report = tell or self._events.append
+        self._warned = {id(sink): len(_warnings(sink)) for sink in self._sinks}
 
     def event(self, event: Event) -> None:
         """Put an event behind those that wait."""
@@ -67,6 +68,7 @@ class Audience:
         if len(rows):
             block = Block(rows)
             self._tell(lambda sink: sink.block(block))
+        self._report_warnings()
 
     def finish(self) -> None:
         """Hand on what is left and close the sinks."""
@@ -81,6 +83,14 @@ class Audience:
             event = self._events.popleft()
             self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
 
+    def _report_warnings(self) -> None:
+        """Tell what a sink goes on without since the last time."""
+        for sink in self._sinks:
+            warnings = _warnings(sink)
+            for sentence in warnings[self._warned[id(sink)] :]:
+                self._report(Event(self.ring.newest, "WARN", sentence))
+            self._warned[id(sink)] = len(warnings)
+
     def _tell(self, call: Callable[[Sink], None], sinks: Sequence[Sink] | None = None) -> None:
         for sink in tuple(self._sinks if sinks is None else sinks):
             try:
@@ -89,6 +99,12 @@ class Audience:
                 self._sinks = [other for other in self._sinks if other is not sink]
                 sentence = f"{type(sink).__name__} gave up and was dropped: {error}"
                 self._report(Event(self.ring.newest, "WARN", sentence))
+
+
+def _warnings(sink: Sink) -> Sequence[str]:
+    """Return a sink's own list of what it goes on without, if it has one."""
+    warnings: Sequence[str] = getattr(sink, "warnings", ())
+    return warnings
 
 
 class Service:

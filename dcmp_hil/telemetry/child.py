@@ -68,6 +68,7 @@ class State(NamedTuple):
     events: int  # taken from the parent
     statistics: Statistics
     kept: Lengths
+    troubles: list[str]
 
 
 def main(connection: int, setup: int) -> None:
@@ -155,8 +156,9 @@ class _Watcher:
     def _hand_on(self) -> None:
         self._audience.hand_on()
         lengths = self._keeper.lengths if self._keeper else Lengths()
+        figures, ring = self._figures, self._ring
         self._ledger.write(
-            State(self._ring.position, self._ring.dropped, self._taken, self._figures.statistics, lengths)
+            State(ring.position, ring.dropped, self._taken, figures.statistics, lengths, figures.troubles)
         )
 
     def _close(self) -> None:

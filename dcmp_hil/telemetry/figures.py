@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.keeper import Keeper
     from dcmp_hil.telemetry.statistics import Statistics
 
+_TROUBLES, _LONGEST = 100, 500  # characters
+
 
 class Figures:
     """A sink of sinks.
@@ -28,11 +30,17 @@ class Figures:
         Makes the summary.
     keeper
         Keeps columns and events; None keeps nothing, and memory stays bounded.
+
+    Attributes
+    ----------
+    troubles
+        Warnings and errors with their time, the first hundred.
     """
 
     def __init__(self, statistics: Statistics, keeper: Keeper | SharedKeeper | None) -> None:
         self.statistics = statistics
         self.keeper = keeper
+        self.troubles: list[str] = []
 
     def block(self, block: Block) -> None:
         """Take consecutive periods."""
@@ -41,7 +49,9 @@ class Figures:
             self.keeper.block(block)
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Take an event; the first warnings and errors are kept in any case."""
+        if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
+            self.troubles.append(f"{event.t:.3f} s: {event.text[:_LONGEST]}")
         if self.keeper:
             self.keeper.event(event)
 

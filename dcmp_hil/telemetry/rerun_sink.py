@@ -39,6 +39,11 @@ _CLOSING = 12.0  # s, for all of it; long enough for a window that is still open
 _FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
+_STUCK = (
+    "The viewer, or the disk, has taken nothing for seconds and is left behind; the run goes on. "
+    "Close that viewer and open another."
+)
+_INCOMPLETE = "The recording is incomplete: {error}. Free some space; the run goes on."
 
 
 class RerunSink:
@@ -83,6 +88,7 @@ class RerunSink:
         port: int = window.PORT,
     ) -> None:
         self.warnings: list[str] = []
+        self._logged: set[str] = set()
         self.port: int | None = None
         self._rig = rig
         self._frames = Frames(rig)
@@ -108,30 +114,42 @@ class RerunSink:
         self._tell(partial(_send, self._frames.of_block(block)), float(block["t"][-1]))
 
     def event(self, event: Event) -> None:
-        """Take an event."""
-        self._tell(partial(_send, [self._frames.of_event(event)]), event.t)
+        """Take an event; one of our own warnings that comes back is there already."""
+        if event.text not in self._logged:
+            self._log(event)
 
     def close(self) -> None:
         """Write what is left, and give up after 12 s at most; a second call waits for the first."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(_CLOSING * 1e9)
-        for outlet in self._outlets:
-            outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
         atexit.unregister(self.close)
+        errors: list[Exception] = []
+        for outlet in self._outlets:
+            try:
+                outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
+            except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
+                errors.append(error)
+        if errors:
+            raise RuntimeError(_INCOMPLETE.format(error=errors[0]))
 
     def _tell(self, job: Job, t: float = 0.0) -> None:
         for outlet in tuple(self._outlets):
-            if not outlet.do(job):
+            try:
+                sentence = "" if outlet.do(job) else _STUCK
+            except Exception as error:  # noqa: BLE001 - one outlet that fails is no reason to lose the other
+                outlet.leave()
+                sentence = _INCOMPLETE.format(error=error)
+            if sentence:
                 self._outlets.remove(outlet)
-                self._warn_of_a_stuck_outlet(t)
+                self._warn(t, sentence)
 
-    def _warn_of_a_stuck_outlet(self, t: float) -> None:
-        sentence = (
-            "The viewer, or the disk, has taken nothing for seconds and is left behind; the run goes on. "
-            "Close that viewer and open another."
-        )
+    def _warn(self, t: float, sentence: str) -> None:
         self.warnings.append(sentence)
-        self.event(Event(t, "WARN", sentence))
+        self._logged.add(sentence)
+        self._log(Event(t, "WARN", sentence))
+
+    def _log(self, event: Event) -> None:
+        self._tell(partial(_send, [self._frames.of_event(event)]), event.t)
 
     def _stream(self) -> rr.RecordingStream:
         return rr.RecordingStream(self._application, recording_id=self._recording)
@@ -149,7 +167,7 @@ class RerunSink:
             _begin(rr.FileSink(record), self._rig, stream)
         except RuntimeError as error:  # a file that can be opened, on a disk that is full
             raise ConfigError(f"The recording cannot begin: {error}. Free some space.") from None
-        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING))
+        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING, flushes=True))
 
     def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> Outlet:
         outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)

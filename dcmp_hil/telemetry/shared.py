@@ -11,7 +11,7 @@ import zlib
 from typing import Any
 
 _HEADER = struct.Struct("QQQ")  # number, length, check sum
-_SLOT = 1 << 20  # bytes; only those written take memory
+_SLOT = 1 << 18  # bytes; only those written take memory
 
 
 def reserve(owner: object, what: str) -> int:
