@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from rich.live import Live
 from rich.text import Text
 
+from dcmp_hil.telemetry.statistics import Durations
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -32,6 +34,7 @@ class StatusLine:
         self._period = period
         self._phase = ""
         self._late = 0
+        self._lateness = Durations()
         self._live: Live | None = None
 
     def block(self, block: Block) -> None:
@@ -39,6 +42,7 @@ class StatusLine:
         self._late += int((block["lateness"] > 0.5 * self._period).sum())
         if not self._console.is_terminal:
             return
+        self._lateness.add(block["lateness"])
         if self._live is None:
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
             self._live.start()
@@ -57,6 +61,7 @@ class StatusLine:
             self._live.stop()
 
     def _line(self, block: Block) -> Text:
+        lateness = self._lateness.percentiles()
         parts = (
             f"{block['t'][-1]:8.2f} s",
             f"{self._phase:8}",
@@ -65,5 +70,6 @@ class StatusLine:
             f"voltage {block['voltage_sent'][-1]:+6.2f} V",
             f"w {block['disturbance_estimate'][-1]:+7.2f} rad/s²",
             f"late {self._late}",
+            f"lateness {lateness.p99:.0f} µs p99, {lateness.max:.0f} max",
         )
         return Text("  ".join(parts), no_wrap=True, overflow="crop")

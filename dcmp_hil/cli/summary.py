@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rich.console import Group
@@ -11,6 +12,9 @@ from rich.text import Text
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.session import Result
+    from dcmp_hil.telemetry.statistics import Histogram
+
+_BARS = " ▁▂▃▄▅▆▇█"
 
 
 def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
@@ -55,14 +59,25 @@ def _durations(result: Result) -> Table:
     table.add_column("µs", no_wrap=True)
     for quantile in ("p50", "p99", "p99.9", "max"):
         table.add_column(quantile, justify="right", no_wrap=True)
+    table.add_column("how many, by 1, 2, 5, 10 …", no_wrap=True, style="dim")
     figures = result.summary
-    for what, values in (
-        ("period", figures.period_us),
-        ("lateness", figures.lateness_us),
-        ("sample to command", figures.compute_us),
+    for what, values, histogram in (
+        ("period", figures.period_us, figures.period_histogram),
+        ("lateness", figures.lateness_us, figures.lateness_histogram),
+        ("sample to command", figures.compute_us, figures.compute_histogram),
     ):
-        table.add_row(what, *(f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max)))
+        quantiles = (f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max))
+        table.add_row(what, *quantiles, _bars(histogram))
     return table
+
+
+def _bars(histogram: Histogram) -> str:
+    """Draw counts on a logarithmic scale, a character a bar, between the first bound and the last."""
+    if not histogram.counts:
+        return ""
+    most = math.log1p(max(histogram.counts))
+    bars = "".join(_BARS[math.ceil(8 * math.log1p(count) / most)] for count in histogram.counts)
+    return f"≤{histogram.up_to_us[0]:g} {bars} ≤{histogram.up_to_us[-1]:g}"
 
 
 def _refusals(result: Result) -> list[Text]:

@@ -23,7 +23,7 @@ def dashboard(rig: RigView) -> rrb.Blueprint:
     joint = rrb.Vertical(
         plot("joint/position_rad"), plot("joint/velocity_rad_s"), plot("joint/disturbance_rad_s2")
     )
-    timing = rrb.Horizontal(_timing(), _histogram(), column_shares=[56, 44])
+    timing = rrb.Horizontal(_timing(), _histograms(), column_shares=[56, 44])
     control = rrb.Vertical(plot("control/tracking_error_mrad", legend=False), _voltage(rig), timing)
     states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
     right = rrb.Vertical(rrb.Horizontal(joint, control), states, row_shares=[80, 20])
@@ -112,9 +112,17 @@ def _parameters() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(origin="params", name="Parameters")
 
 
-def _histogram() -> rrb.BarChartView:
+def _histograms() -> rrb.Tabs:
     legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=False)
-    return rrb.BarChartView(origin="loop/period_hist", name="All periods [µs]", plot_legend=legend)
+    views = [
+        rrb.BarChartView(origin=f"loop/{what}_hist", name=name, plot_legend=legend)
+        for what, name in (
+            ("period", "All periods [µs]"),
+            ("lateness", "All lateness [µs]"),
+            ("compute", "Sample to command [µs]"),
+        )
+    ]
+    return rrb.Tabs(*views, active_tab=0)
 
 
 def _states() -> rrb.StateTimelineView:

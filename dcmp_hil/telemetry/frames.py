@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.histogram import PeriodHistogram
+from dcmp_hil.telemetry.histogram import Histogram
 from dcmp_hil.telemetry.lanes import Lane
-from dcmp_hil.telemetry.scenery import ARM, GHOST, LIMITS, PERIODS, lane_path, turned
-from dcmp_hil.telemetry.signals import TIMING, by_plot
+from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, lane_path, turned
+from dcmp_hil.telemetry.signals import by_plot
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,10 @@ class Frames:
     def __init__(self, rig: RigView) -> None:
         self.plots: dict[str, list[Signal]] = {}
         self._rig = rig
-        self._histogram = PeriodHistogram(rig.period)
+        self._histograms = {
+            field: Histogram(low * rig.period, high * rig.period)
+            for field, (_, low, high, _) in HISTOGRAMS.items()
+        }
         self._lanes = {name: Lane() for name in ("voltage", "samples")}
         self._last_slot = -1
 
@@ -61,8 +64,9 @@ class Frames:
     def of_block(self, block: Block) -> list[Call]:
         """Return the calls for consecutive periods, at least one."""
         calls = [*self._lines(block), *self._slow(block), *self._states(block)]
-        if self._histogram.add(block["t"], block["period"]):
-            calls.append(self._bars(block["t"][-1:]))
+        for field, histogram in self._histograms.items():
+            if histogram.add(block["t"], block[field]):
+                calls.append(self._bars(field, block["t"][-1:]))
         return calls
 
     def of_event(self, event: Event) -> Call:
@@ -108,15 +112,15 @@ class Frames:
     def _state(self, lane: str, t: NDArray[np.float64], states: list[str]) -> Call:
         return lane_path(lane), self._times(t), rr.StateChange.columns(state=states)
 
-    def _bars(self, t: NDArray[np.float64]) -> Call:
-        shown = self._histogram
+    def _bars(self, field: str, t: NDArray[np.float64]) -> Call:
+        shown, (entity, _, _, colour) = self._histograms[field], HISTOGRAMS[field]
         bars = rr.BarChart.columns(
             values=[shown.counts.copy()],
             abscissa=[shown.centres_us],
             widths=[shown.widths_us],
-            color=[TIMING],
+            color=[colour],
         )
-        return PERIODS, self._times(t), bars
+        return entity, self._times(t), bars
 
     def _times(self, t: NDArray[np.float64]) -> list[rr.TimeColumn]:
         # Rounded: what Rerun makes of float seconds itself is cut off, and one nanosecond short.

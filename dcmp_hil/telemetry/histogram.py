@@ -1,4 +1,4 @@
-"""How long the periods of a run really were, as a histogram that grows."""
+"""How long the periods of a run really were, how late and how busy, as histograms that grow."""
 
 from __future__ import annotations
 
@@ -9,30 +9,29 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_BINS = 61  # odd, so that the nominal period lies in the middle of a bar
-_REACH = 0.5  # of a period, either way
+_BINS = 61  # odd, so that a nominal period lies in the middle of a bar
 _EVERY = 1.0  # s between two pictures of it
 
 
-class PeriodHistogram:
-    """Counts of periods from half to one and a half of the nominal; what lies outside is in the last bars.
+class Histogram:
+    """Counts of durations between two bounds; what lies outside is in the first and the last bar.
 
     Parameters
     ----------
-    period
-        s, nominal.
+    low, high
+        s.
     """
 
-    def __init__(self, period: float) -> None:
-        self._edges = 1e6 * period * np.linspace(1.0 - _REACH, 1.0 + _REACH, _BINS + 1)
+    def __init__(self, low: float, high: float) -> None:
+        self._edges = 1e6 * np.linspace(low, high, _BINS + 1)
         self.centres_us = 0.5 * (self._edges[1:] + self._edges[:-1])
         self.widths_us = np.diff(self._edges)
         self.counts = np.zeros(_BINS, np.int64)
         self._due = -np.inf
 
-    def add(self, t: NDArray[np.float64], period: NDArray[np.float64]) -> bool:
-        """Count `period` (s, NaN left out); tell whether it is time, by the `t` of the rows, to show it."""
-        known = period[~np.isnan(period)] * 1e6
+    def add(self, t: NDArray[np.float64], durations: NDArray[np.float64]) -> bool:
+        """Count `durations` (s, NaN left out); tell whether it is time, by the rows' `t`, to show it."""
+        known = durations[~np.isnan(durations)] * 1e6
         self.counts += np.histogram(np.clip(known, self._edges[0], self._edges[-1]), self._edges)[0]
         if t[-1] < self._due:
             return False

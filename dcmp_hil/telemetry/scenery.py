@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
 ARM, GHOST = "rig/arm", "rig/reference"
 LIMITS = "control/voltage_V/limit"
-PERIODS = "loop/period_hist"
+HISTOGRAMS = {
+    "period": ("loop/period_hist", 0.5, 1.5, TIMING),
+    "lateness": ("loop/lateness_hist", 0.0, 0.5, ERROR),
+    "compute": ("loop/compute_hist", 0.0, 0.5, FAINT),
+}
+"""Entities of the histograms by field, with bounds in periods and colour."""
 LANES = {
     "phase": {
         "probing": FAINT,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
+BOUNDS_US = (*(mantissa * 10.0**power for power in range(6) for mantissa in (1.0, 2.0, 5.0)), 1e6)
 _LATE = 0.5  # of a period: a sample that arrives later than this counts as late
 
 
@@ -25,6 +26,15 @@ class Percentiles:
     p99: float
     p999: float
     max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """How many durations there were up to each bound and above the one before, to 1 %."""
+
+    up_to_us: tuple[float, ...]
+    """1, 2, 5, 10 ... us, as far as there is anything; what is above a second is infinite."""
+    counts: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +60,9 @@ class Summary:
     lateness_us: Percentiles
     compute_us: Percentiles
     """From a sample's arrival to its command's departure."""
+    period_histogram: Histogram
+    lateness_histogram: Histogram
+    compute_histogram: Histogram
     rate_error_ppm: float | None
     """By how much samples came too slowly (+) by the host's clock, from both ends of the window."""
     realtime_factor: float
@@ -87,6 +100,8 @@ class Durations:
 
     _FIRST, _BINS_E = 1e-8, 100.0  # s; bins an e-fold
     _N = int(_BINS_E * math.log(1e11)) + 2
+    # bins below each bound
+    _BOUNDS = np.rint(np.log(np.array(BOUNDS_US) * 1e-6 / _FIRST) * _BINS_E).astype(np.int64)
 
     def __init__(self) -> None:
         self.counts = np.zeros(self._N, np.int64)
@@ -111,6 +126,16 @@ class Durations:
         middle = self._FIRST * np.exp((bins + 0.5) / self._BINS_E)
         p50, p99, p999 = (round(1e6 * float(v), 3) for v in np.clip(middle, self._min, self._max))
         return Percentiles(p50, p99, p999, round(1e6 * self._max, 3))
+
+    def histogram(self) -> Histogram:
+        """Return the counts between 1, 2, 5, 10 ... us."""
+        below = np.append(np.cumsum(self.counts), 0)[self._BOUNDS - 1]
+        counts = np.diff(below, prepend=0, append=self.counts.sum())
+        some = np.flatnonzero(counts)
+        if not len(some):
+            return Histogram((), ())
+        shown = slice(int(some[0]), int(some[-1]) + 1)
+        return Histogram((*BOUNDS_US, math.inf)[shown], tuple(counts[shown].tolist()))
 
 
 class Statistics:
@@ -177,6 +202,9 @@ class Statistics:
             period_us=self.period.percentiles(),
             lateness_us=self.lateness.percentiles(),
             compute_us=self.compute.percentiles(),
+            period_histogram=self.period.histogram(),
+            lateness_histogram=self.lateness.histogram(),
+            compute_histogram=self.compute.histogram(),
             rate_error_ppm=1e6 * (self._last_lateness - self._first_lateness) / span if span > 0 else None,
             realtime_factor=realtime_factor,
             window_s=(self._first_t, self._last_t + self._period)

@@ -113,10 +113,13 @@ def test_phases_events_and_states(tmp_path: Path) -> None:
 def test_histogram_counts_every_known_period(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(VIEW, record, "none"), periods=2100)
-    table = read_back(record, "loop/period_hist")
+    table: dict[str, list[Any]] = read_back(record, "loop/period_hist")
     last: Any = table["BarChart:values"][-1]
     assert sum(last[0]["buffer"]) == table["tick"][-1]
     assert len(table["tick"]) == 3
+    for what in ("lateness", "compute"):  # the first period has these
+        bars: Any = read_back(record, f"loop/{what}_hist")["BarChart:values"][-1]
+        assert sum(bars[0]["buffer"]) == table["tick"][-1] + 1
 
 
 def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:

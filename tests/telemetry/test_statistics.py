@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.ring import FIELDS
-from dcmp_hil.telemetry.statistics import Durations, Statistics, Summary
+from dcmp_hil.telemetry.statistics import BOUNDS_US, Durations, Histogram, Statistics, Summary
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -130,6 +130,24 @@ def test_durations_clip_what_is_early_or_exactly_on_time() -> None:
     assert got.max == 0.0
     assert got.p50 <= 0.0
     assert not durations.counts.sum() > 3, "NaN is no duration"
+
+
+def test_a_histogram_counts_every_duration_once_between_its_bounds() -> None:
+    seconds = 1e-6 * np.array([0.0, -3.0, 0.3, 1.7, 4.0, 4.9, 30.0, 30.0, 2e6, math.nan])
+    durations = Durations()
+    for piece in np.split(seconds, 5):
+        durations.add(piece)
+    found = durations.histogram()
+    assert found.up_to_us == (*BOUNDS_US, math.inf)
+    counts = dict(zip(found.up_to_us, found.counts, strict=True))
+    assert {bound: n for bound, n in counts.items() if n} == {1.0: 3, 2.0: 1, 5.0: 2, 50.0: 2, math.inf: 1}
+
+
+def test_a_histogram_shows_no_empty_ends() -> None:
+    durations = Durations()
+    assert durations.histogram() == Histogram((), ())
+    durations.add(1e-6 * np.array([30.0, 300.0]))
+    assert durations.histogram() == Histogram((50.0, 100.0, 200.0, 500.0), (1, 0, 0, 1))
 
 
 def test_statistics_measure_tracking_when_no_truth_is_known() -> None:
