@@ -3,8 +3,8 @@
 Why none of it can lock the machine or starve telemetry: the loop sleeps until its next tick, and gives up CPU
 and interpreter lock with that. Should a late loop not get to sleep for 80 ms, RLIMIT_RTTIME brings SIGXCPU
 and every thread goes back to normal; should Python not get to run that handler, the kernel keeps 5 % of each
-second for everybody else. Whoever looks on runs below the loop, and gets the interpreter lock within the
-switch interval. Children start as normal processes.
+second for everybody else. Telemetry is a process of its own, and children start as normal processes; a thread
+of ours runs below the loop, and gets the interpreter lock within the switch interval.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config.sections import TimingSection
 
 _HELPERS = 1  # the lowest real-time priority
-_LONGEST = 80_000  # us that a real-time thread may run without a sleep; telemetry wakes it every 100 ms
+_LONGEST = 80_000  # us that a real-time thread may run without a sleep; a helper may wake it every 100 ms
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall
 _TIMER_SLACK = 29  # prctl: PR_SET_TIMERSLACK
 _USUAL_SLACK = 0  # ns; 0 means: as the process began
