@@ -84,7 +84,7 @@ class Aligner:
     ) -> None:
         self._at = at
         self._delay = delay
-        self._tolerance = _SAME * delay
+        self._off = _SAME * delay
         self._began = began
         self._since = began()
         self._due = math.nan  # the instant that the cycle before looked ahead to
@@ -100,13 +100,12 @@ class Aligner:
         ahead
             The reference at t + delay.
         """
-        began = self._began()
-        if self._delay == 0.0:
+        began, delay = self._since, self._delay
+        jumps = False
+        if began == math.inf and (began := self._began()) != math.inf:  # it begins once
+            self._since, jumps = began, True  # to where the arm is
+        if delay == 0.0:
             return ahead, began
-        at_t = self._then
-        off = t - self._due
-        if not -self._tolerance < off < self._tolerance or began != self._since:
-            at_t = self._at(t)  # where it begins it jumps to where the arm is
-            self._since = began
-        self._due, self._then = t + self._delay, ahead
+        at_t = self._at(t) if jumps or not -self._off < t - self._due < self._off else self._then
+        self._due, self._then = t + delay, ahead
         return at_t, began

@@ -32,13 +32,13 @@ FIELDS = (
 NOWHERE = Reference(math.nan, math.nan, math.nan)
 _NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
 _COUNT = struct.Struct("q")  # in native form, which is one store of the CPU
-_HEAD = 64
+_HEAD, _SIZE = 64, _NUMBERED.size
 _pack, _count = _NUMBERED.pack_into, _COUNT.pack_into
 
 
 def size_of(capacity: int) -> int:
     """Return the bytes that a ring of so many rows takes."""
-    return _HEAD + capacity * _NUMBERED.size
+    return _HEAD + capacity * _SIZE
 
 
 class Ring:
@@ -66,7 +66,7 @@ class Ring:
         """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
         sample, estimate, reference, demand, voltage, timing = cycle
         k = self._written
-        row = _HEAD + k % self.capacity * _NUMBERED.size
+        row = _HEAD + k % self.capacity * _SIZE
         _pack(
             self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth, *now, began
         )  # fmt: skip
