@@ -71,6 +71,14 @@ class Machine(RuleBasedStateMachine):
         self.system.alone(1)
         self.system.say(Drive(mV, self.system.seq(age), arm, False, False, session, 20))
 
+    @rule(mV=st.integers(-3000, 3000), age=st.integers(4, 12), ticks=st.integers(15, 40))
+    def owner_lags(self, mV: int, age: int, ticks: int) -> None:  # noqa: N803
+        """Commands go on coming, and all of them are too old."""
+        for _ in range(ticks):
+            self.system.alone(1)
+            seq, owner = self.system.seq(age), self.system.board.owner
+            self.system.say(Drive(mV, seq, True, False, False, owner, 20))
+
     @rule(mV=st.sampled_from([0, 0, 1]), clear=st.booleans(), own=st.booleans())
     def somebody_clears(self, mV: int, clear: bool, own: bool) -> None:  # noqa: N803
         session = self.system.board.owner if own else STRANGER
