@@ -47,9 +47,14 @@ pytest: $(DEV) ## every test, without checks or coverage
 
 faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real hosts that end; tables in reports/
 	@mkdir -p reports
-	@$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 --markdown reports/faults.md --json reports/faults.json
-	@$(BIN)/python -m tools.host_death --n 30 --markdown reports/host-death.md --json reports/host-death.json
-	@$(BIN)/python -m tools.host_endings --n 10 --markdown reports/host-endings.md --json reports/host-endings.json
+	@failed=0; \
+	$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 \
+		--markdown reports/faults.md --json reports/faults.json || failed=1; \
+	$(BIN)/python -m tools.host_death --n 30 \
+		--markdown reports/host-death.md --json reports/host-death.json || failed=1; \
+	$(BIN)/python -m tools.host_endings --n 10 \
+		--markdown reports/host-endings.md --json reports/host-endings.json || failed=1; \
+	exit $$failed
 
 bench: $(DEV) ## measure, print a table
 	@$(BIN)/python -m tools.bench $(ARGS)

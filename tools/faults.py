@@ -84,10 +84,10 @@ def run_row(place: int, seeds: Sequence[int]) -> Line:
     return line
 
 
-def run_healthy(block: int, size: int) -> Line:
-    """Run a block of healthy seeds."""
+def run_healthy(seeds: Sequence[int]) -> Line:
+    """Run some healthy seeds."""
     line = Line("none")
-    for seed in range(block * size, (block + 1) * size):
+    for seed in seeds:
         line.add(seed, healthy(seed))
     return line
 
@@ -139,8 +139,8 @@ def main() -> int:
     with ProcessPoolExecutor(asked.processes) as pool:
         seeds = range(asked.first, asked.first + asked.seeds)
         lines = pool.map(partial(run_row, seeds=seeds), places)
-        sizes = pool.map(partial(run_healthy, size=asked.healthy // blocks if blocks else 0), range(blocks))
-        table = [*lines, *([merged([*sizes])] if blocks else [])]
+        healthy_seeds = [range(block, asked.healthy, blocks) for block in range(blocks)]
+        table = [*lines, *([merged([*pool.map(run_healthy, healthy_seeds)])] if blocks else [])]
     said: list[str] = []
     code = tell(table, 1e-9 * (clock.now_ns() - began_ns), said.append)
     sys.stdout.write("".join(said))

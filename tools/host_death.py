@@ -29,7 +29,7 @@ WAYS = {"SIGKILL": ("LINK_DOWN", (-9,)), "SIGSTOP": ("HOST_SILENT", (3, 4)), "un
 
 
 _HEAD = (
-    "| host | n | 0 V after, ms: median | max | bound | after the line went down: max | bound "
+    "| host | n | 0 V after, ms: median | max | bound | after host or line was gone: max | bound "
     "| the device says | host's code | wrong | started again | doubt, ms |"
 )
 

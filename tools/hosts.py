@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 BOUND_S = 60.0
 TRIES, MOST_DOUBT_US = 10, 500
 _LOOK_S = 0.002
+_TOO_LATE = (3, 4)  # its samples, or its device's commands, came too late
 _DRIVEN_mV = 100
 
 
@@ -31,14 +32,25 @@ def start_host(port: str, *options: str, folder: Path | None = None) -> subproce
 
 
 def is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
-    """Wait until the host drives; False if it ended by itself, as on a computer that is busy elsewhere."""
+    """Wait until the host drives; False if it came too late for its device, as on a computer that is busy.
+
+    Raises
+    ------
+    RuntimeError
+        If it ended for any other reason.
+    """
 
     def settled() -> bool:
         driven = device.output.state == State.RUN and abs(device.output.voltage_mV) > _DRIVEN_mV
         return driven or host.poll() is not None
 
     wait(settled, "the host drives")
-    return host.poll() is None
+    if host.poll() is None:
+        return True
+    said = host.stderr.read().decode() if host.stderr else ""
+    if host.returncode not in _TOO_LATE:
+        raise RuntimeError(f"a host ended with {host.returncode} before it drove: {said}")
+    return False
 
 
 def wait(holds: Callable[[], bool], what: str) -> None:

@@ -62,5 +62,5 @@ def test_an_open_row_is_shown_and_fails_nothing() -> None:
 def test_rows_and_healthy_blocks_are_run() -> None:
     place = next(place for place, row in enumerate(ROWS) if row.fault == "firmware.stop")
     assert run_row(place, [1]).outcomes == {"STOPPED": 1}
-    healthy = merged([run_healthy(0, 1), run_healthy(1, 1)])
+    healthy = merged([run_healthy(range(1)), run_healthy(range(1, 2))])
     assert (healthy.runs, healthy.right) == (2, 2)
