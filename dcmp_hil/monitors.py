@@ -132,4 +132,7 @@ class _UnexplainedError(TripError):
     def explained(self) -> TripError:
         """Return it with its likely cause."""
         reason, sentence, remedy = self._diagnosis.finding()
-        return TripError(reason, f"{sentence}: {self._figures}", remedy)
+        trip = TripError(reason, f"{sentence}: {self._figures}", remedy)
+        for note in getattr(self, "__notes__", ()):
+            trip.add_note(note)
+        return trip

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import ConfigError, DeadlineError, TripError
+from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
 from dcmp_hil.host import host_facts, in_words
 from dcmp_hil.realtime import Grant, RealTime
 from dcmp_hil.telemetry.apart import Apart
@@ -76,6 +76,9 @@ class Result:
     overruns: int = 0
     outliers: int = 0
     troubles: tuple[str, ...] = ()
+
+
+_AT_ZERO: tuple[Literal["INFO", "WARN"], str] = ("INFO", "amplifier at 0 V")
 
 
 class Session:
@@ -152,6 +155,7 @@ class Session:
         """
         line, recorder = self._line, self._recorder
         began_ns = self._wall.now_ns()
+        end = _AT_ZERO
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
             with self.stop, self._open_telemetry(), self._realtime or nullcontext():
@@ -162,16 +166,21 @@ class Session:
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
+            end = _end_after(seen)
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
             raise trip from None
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
+            end = _end_after(error)
+            raise
+        except BaseException as error:
+            end = _end_after(error)
             raise
         finally:
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
-            recorder.event(Event(recorder.t, "INFO", "amplifier at 0 V"))
+            recorder.event(Event(recorder.t, *end))
             recorder.close()
             if self._apart:
                 self._figures = self._apart.figures
@@ -259,6 +268,15 @@ def run(
     session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks)
     session.run()
     return session.result()
+
+
+def _end_after(error: BaseException) -> tuple[Literal["INFO", "WARN"], str]:
+    """Say what is known of the amplifier after an error: a device that did not answer confirmed nothing."""
+    if isinstance(error, OpenError):
+        return "INFO", "the device was not armed"
+    if isinstance(error, BackendError) or getattr(error, "__notes__", None):
+        return "WARN", "0 V was not confirmed: the device goes there by itself"
+    return _AT_ZERO
 
 
 def _check_times(length: float, window_from: float, *, fast: bool) -> None:

@@ -118,16 +118,17 @@ class DeviceBackend:
         Raises
         ------
         LinkError
-            If the device did not confirm 0 V, and nothing else was wrong before.
+            If the device did not confirm 0 V. Where something else was wrong before, that has it as a note.
         """
         if not self._open:
             return
         self._open = False
         try:
             self._leave(error)
-        except BackendError:
+        except BackendError as unconfirmed:
             if error is None:
                 raise
+            error.add_note(str(unconfirmed))
         finally:
             self._link.close()
 

@@ -21,7 +21,7 @@ err = Console(stderr=True, soft_wrap=True)
 
 def complain(error: DcmpError) -> None:
     """Print an error, one line a fault."""
-    for line in str(error).splitlines():
+    for line in (*str(error).splitlines(), *getattr(error, "__notes__", ())):
         err.print(Text.assemble(("error: ", "bold red"), line))
 
 
