@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 EXAMPLES, LENGTH = 1000, 100
-"""It ends with the first find, within 170 for every error and each of eight seeds: Hypothesis draws by what else is
-imported, so no smaller number holds in every order of the tests."""
+"""It ends with the first find, within 170 for every error and each of eight seeds: Hypothesis draws by what
+else is imported, so no smaller number holds in every order of the tests."""
 Patch = pytest.MonkeyPatch
 
 pytestmark = pytest.mark.usefixtures("untraced")
