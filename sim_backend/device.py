@@ -77,7 +77,7 @@ class VirtualDevice:
         self._ticked = (self.now_us, 0, 0)  # the same; when its tick was sent and answered, ns
         self.tick_count = 0
         self.port = ""
-        self.output = Output(self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
+        self.output = Output(self.now_us, self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
         self.log: deque[Output] = deque(maxlen=_KEPT)
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 TICK = Struct("<IIHBx")
 """now_us, counts, wait_ms, flags."""
-OUTPUT = Struct("<IIhBBHBB")
+OUTPUT = Struct("<IIIhBBHBB")
 """The fields of Output."""
 PLANT_TIME = 1  # flag of TICK: the board's clock stands still until the next one
 _UNASKED, _LINK_UP = 1, 2  # flags of OUTPUT
@@ -18,6 +18,7 @@ class Output(NamedTuple):
 
     now_us: int  # by the firmware's clock
     since_us: int  # when the output became what it is
+    fed_us: int  # when the watchdog was fed for the last time
     voltage_mV: int
     enable: int
     state: int

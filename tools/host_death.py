@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     import subprocess
 
 OFF_US, SEEN_US = 21_000, 2_000  # watchdog and a period; where the device sees its line go down
+QUEUED_US = 3_000  # how old a command may be that still counts
 WAYS = {"SIGKILL": ("LINK_DOWN", (-9,)), "SIGSTOP": ("HOST_SILENT", (3, 4)), "unplug": ("LINK_DOWN", (3, 4))}
 """What the device must say, and with what the host may end: a stopped one goes on later, and finds out."""
 
 
 _HEAD = (
-    "| host | n | 0 V after, ms: median | max | bound | after host or line was gone: max | bound "
+    "| host | n | 0 V after, ms: median | max | after its last command: max | bound "
+    "| after host or line was gone: max | bound "
     "| the device says | host's code | wrong | started again | doubt, ms |"
 )
 
@@ -39,6 +41,8 @@ class Death(NamedTuple):
 
     way: str
     off_us: int  # from the deed to 0 V
+    silent_us: int  # from the last command that counted to 0 V: what the watchdog goes by
+    fed_us: int  # from the deed to that command, which a busy computer may bring late; below 0: before it
     seen_us: int | None  # from the line going down to 0 V; None if it did not
     fault: str  # what the device says it was
     exit_code: int  # of the host
@@ -50,9 +54,11 @@ class Death(NamedTuple):
     def wrong(self) -> list[str]:
         """What is not as it must be."""
         fault, codes = WAYS[self.way]
-        off_us, seen_us = self.off_us - self.doubt_us, (self.seen_us or 0) - self.doubt_us
+        fed_us, seen_us = self.fed_us - self.doubt_us, (self.seen_us or 0) - self.doubt_us
+        silent = f"0 V {1e-3 * self.silent_us:.1f} ms after the last command"
         return [
-            *([f"0 V after {1e-3 * off_us:.1f} ms"] if off_us > OFF_US else []),
+            *([silent] if self.silent_us > OFF_US else []),
+            *([f"a command counted {1e-3 * fed_us:.1f} ms after the deed"] if fed_us > QUEUED_US else []),
             *([f"0 V {1e-3 * seen_us:.1f} ms after the line went down"] if seen_us > SEEN_US else []),
             *([f"the device says {self.fault}"] if self.fault != fault else []),
             *([f"the host ended with {self.exit_code}"] if self.exit_code not in codes else []),
@@ -95,9 +101,12 @@ def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable:
         host.send_signal(signal.SIGCONT)
     code = host.wait(BOUND_S)
     since = [output for output in device.log if output.since_us >= off.since_us]
+    deed_us = done_us if way == "SIGSTOP" else began_us
     return Death(
         way=way,
-        off_us=off.since_us - (done_us if way == "SIGSTOP" else began_us),
+        off_us=off.since_us - deed_us,
+        silent_us=off.since_us - off.fed_us,
+        fed_us=off.fed_us - deed_us,
         seen_us=None if way == "SIGSTOP" else max(0, off.since_us - (began_us if cable else done_us)),
         fault=Fault(off.fault).name,
         exit_code=code,
@@ -118,7 +127,8 @@ def table(deaths: list[Death]) -> str:
             continue
         line = (f"{max(seen):.1f}", f"{1e-3 * SEEN_US:g}") if seen else ("", "")
         cells = (
-            way, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}", f"{1e-3 * OFF_US:g}", *line,
+            way, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}",
+            f"{1e-3 * max(death.silent_us for death in these):.1f}", f"{1e-3 * OFF_US:g}", *line,
             ", ".join(sorted({death.fault for death in these})),
             ", ".join(sorted({str(death.exit_code) for death in these})),
             sum(bool(death.wrong) for death in these), sum(death.tries - 1 for death in these),

@@ -7,7 +7,7 @@ import pytest
 from tests.firmware.core_library import compiler
 from tools.host_death import WAYS, Death, die, table
 
-GOOD = Death("SIGKILL", 5_000, 100, "LINK_DOWN", -9, 50, True, 1)
+GOOD = Death("SIGKILL", 5_000, 6_000, -1_000, 100, "LINK_DOWN", -9, 50, True, 1)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,8 @@ def test_amplifier_goes_off_in_time_when_a_host_dies(way: str) -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"off_us": 21_051}, "0 V after 21.0 ms"),
+        ({"silent_us": 21_001}, "0 V 21.0 ms after the last command"),
+        ({"fed_us": 3_051}, "a command counted 3.0 ms after the deed"),
         ({"seen_us": 2_051}, "0 V 2.0 ms after the line went down"),
         ({"fault": "HOST_SILENT"}, "the device says HOST_SILENT"),
         ({"exit_code": 0}, "the host ended with 0"),

@@ -115,6 +115,7 @@ static void tell_plant(const struct board *board, bool unasked)
     const struct plant_output output = {
         .now_us = now_us(board),
         .since_us = board->since_us,
+        .fed_us = board->device.watchdog.fed_us,
         .voltage_mV = board->output.voltage_mV,
         .enable = board->output.enable,
         .state = (uint8_t)board->device.supervisor.state,

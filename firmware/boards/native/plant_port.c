@@ -28,10 +28,11 @@ void plant_pack_output(const struct plant_output *output, uint8_t bytes[PLANT_OU
 {
     put(&bytes[0], 4, output->now_us);
     put(&bytes[4], 4, output->since_us);
-    put(&bytes[8], 2, (uint16_t)output->voltage_mV);
-    bytes[10] = output->enable;
-    bytes[11] = output->state;
-    put(&bytes[12], 2, output->owner);
-    bytes[14] = output->fault;
-    bytes[15] = (uint8_t)((output->unasked ? 1u : 0u) | (output->link_up ? 2u : 0u));
+    put(&bytes[8], 4, output->fed_us);
+    put(&bytes[12], 2, (uint16_t)output->voltage_mV);
+    bytes[14] = output->enable;
+    bytes[15] = output->state;
+    put(&bytes[16], 2, output->owner);
+    bytes[18] = output->fault;
+    bytes[19] = (uint8_t)((output->unasked ? 1u : 0u) | (output->link_up ? 2u : 0u));
 }

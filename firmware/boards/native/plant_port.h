@@ -14,16 +14,17 @@
  *    11  u8    0
  *
  * The board answers each with one OUTPUT, and sends one more whenever its output changes between two ticks (a disarm, a
- * fault, the host gone): the newest is what the amplifier has to do. 16 bytes:
+ * fault, the host gone): the newest is what the amplifier has to do. 20 bytes:
  *
  *     0  u32   now_us     the board's clock as this is sent
  *     4  u32   since_us   the board's clock as the output became what it is
- *     8  i16   voltage_mV
- *    10  u8    enable     0 or 1
- *    11  u8    state      as in SAMPLE
- *    12  u16   owner      session that owns the device, 0 for none
- *    14  u8    fault      code latched, or of the last one
- *    15  u8    flags      bit 0: no TICK asked for it; bit 1: a host has the link open
+ *     8  u32   fed_us     the board's clock as the watchdog was fed for the last time
+ *    12  i16   voltage_mV
+ *    14  u8    enable     0 or 1
+ *    15  u8    state      as in SAMPLE
+ *    16  u16   owner      session that owns the device, 0 for none
+ *    18  u8    fault      code latched, or of the last one
+ *    19  u8    flags      bit 0: no TICK asked for it; bit 1: a host has the link open
  *
  * The end of the stream ends the board. */
 #ifndef PLANT_PORT_H
@@ -33,7 +34,7 @@
 #include <stdint.h>
 
 #define PLANT_TICK_BYTES 12u
-#define PLANT_OUTPUT_BYTES 16u
+#define PLANT_OUTPUT_BYTES 20u
 
 struct plant_tick {
     uint32_t now_us;
@@ -45,6 +46,7 @@ struct plant_tick {
 struct plant_output {
     uint32_t now_us;
     uint32_t since_us;
+    uint32_t fed_us;
     int16_t voltage_mV;
     bool enable;
     uint8_t state;
