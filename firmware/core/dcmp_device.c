@@ -86,6 +86,12 @@ void dcmp_device_link(struct dcmp_device *device, bool up, uint32_t now_us)
     dcmp_guard_time(device, now_us);
 }
 
+void dcmp_device_fail(struct dcmp_device *device, enum dcmp_fault_code code, int32_t detail, uint32_t now_us)
+{
+    dcmp_guard_time(device, now_us); /* what was earlier is the cause */
+    dcmp_guard_raise(device, DCMP_EVENT_STOP, code, detail);
+}
+
 static struct dcmp_output output(const struct dcmp_device *device)
 {
     const struct dcmp_output now = {dcmp_amplifier_voltage(&device->amplifier), device->supervisor.state == DCMP_RUN};

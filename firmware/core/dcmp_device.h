@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "dcmp_frame.h"
+#include "dcmp_message.h"
 
 /* What the board was built with. Limits can be lowered over the wire, never raised. */
 struct dcmp_config {
@@ -58,6 +59,9 @@ void dcmp_device_overrun(struct dcmp_device *device);
 
 /* The link went down (hang-up, bus-off) or came back. */
 void dcmp_device_link(struct dcmp_device *device, bool up, uint32_t now_us);
+
+/* The board itself has failed: FAULT with this code from every state but BOOT, like a STOP. */
+void dcmp_device_fail(struct dcmp_device *device, enum dcmp_fault_code code, int32_t detail, uint32_t now_us);
 
 /* One period: to be called with the count latched at its start. `edge` may be null. */
 struct dcmp_output dcmp_device_tick(struct dcmp_device *device, uint32_t now_us, uint32_t counts,

@@ -1,0 +1,92 @@
+#include "app.h"
+
+#define CHUNK 64u /* bytes at a time */
+
+void app_start(struct app *app, const struct dcmp_config *config, enum dcmp_carrier carrier, struct fault_log *log,
+               int32_t failure, uint32_t now_us)
+{
+    dcmp_device_init(&app->device, config, now_us);
+    dcmp_port_init(&app->port, carrier);
+    app->log = log;
+    app->boot_count = config->boot_count;
+    app->failure = failure;
+    fault_log_open(log);
+}
+
+static bool is_faulted(const struct app *app)
+{
+    return app->device.supervisor.state == DCMP_FAULTED;
+}
+
+static void remember_fault(struct app *app)
+{
+    const struct dcmp_fault *fault = &app->device.supervisor.fault;
+    if (is_faulted(app) && !app->faulted) {
+        const struct fault_log_entry entry = {app->boot_count, app->device.tick, fault->code, fault->detail};
+        fault_log_add(app->log, &entry);
+    }
+    app->faulted = is_faulted(app);
+}
+
+struct dcmp_output app_settle(struct app *app, uint32_t now_us)
+{
+    const struct dcmp_output output = dcmp_device_output(&app->device, now_us);
+    remember_fault(app);
+    return output;
+}
+
+struct dcmp_output app_fail(struct app *app, enum dcmp_fault_code code, int32_t detail, uint32_t now_us)
+{
+    dcmp_device_fail(&app->device, code, detail, now_us);
+    return app_settle(app, now_us);
+}
+
+/* What was wrong before there was a device that could say so. */
+static void say_failure(struct app *app, uint32_t now_us)
+{
+    if (app->failure != APP_WELL) {
+        dcmp_device_fail(&app->device, DCMP_INTERNAL, app->failure, now_us);
+        app->failure = APP_WELL;
+    }
+}
+
+struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
+{
+    if (tick->late) {
+        dcmp_device_late_tick(&app->device);
+    }
+    if (app->lost) {
+        app->lost = false;
+        dcmp_device_overrun(&app->device);
+    }
+    dcmp_device_idle(&app->device, app->idle_percent);
+    dcmp_device_tick(&app->device, tick->now_us, tick->counts, &tick->edge);
+    say_failure(app, tick->now_us);
+    app->life.decisions = app->device.tick;
+    return app_settle(app, tick->now_us);
+}
+
+struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us)
+{
+    uint8_t bytes[CHUNK];
+    uint8_t replies[CHUNK];
+    const size_t length = ring_take(&app->received, bytes, sizeof bytes);
+    const size_t replied =
+        dcmp_port_receive(&app->port, &app->device, bytes, length, now_us, replies, sizeof replies);
+    if (!ring_put(&app->sending, replies, replied)) {
+        dcmp_device_overrun(&app->device);
+    }
+    app->life.receptions++;
+    app_say(app);
+    return app_settle(app, now_us);
+}
+
+void app_say(struct app *app)
+{
+    uint8_t bytes[4u * CHUNK];
+    const size_t room = ring_room(&app->sending);
+    const size_t length =
+        dcmp_port_transmit(&app->port, &app->device, bytes, room < sizeof bytes ? room : sizeof bytes);
+    ring_put(&app->sending, bytes, length); /* there is room */
+}
+

@@ -1,0 +1,38 @@
+/* Where the processor goes. What is missing here leads to HardFault, and so to an end. */
+#include "amplifier.h"
+#include "board.h"
+#include "bxcan.h"
+#include "link_irq.h"
+#include "startup.h"
+#include "timebase.h"
+#include "usart.h"
+
+#define EXCEPTIONS 14u /* of the processor itself, behind reset */
+#define INTERRUPTS 82u
+
+typedef void handler(void);
+
+struct vectors {
+    const uint32_t *stack;
+    handler *reset;
+    handler *exceptions[EXCEPTIONS];
+    handler *interrupts[INTERRUPTS];
+};
+
+extern const struct vectors vectors;
+
+const struct vectors vectors __attribute__((section(".vectors"), used)) = {
+    .stack = stack_end,
+    .reset = startup_reset,
+    .exceptions = {board_nmi, startup_error, startup_error, startup_error, startup_error},
+    .interrupts =
+        {
+            [LINK_IRQ] = board_link,
+            [BXCAN_TX_IRQ] = board_can_sent,
+            [BXCAN_RX0_IRQ] = board_can_received,
+            [BXCAN_SCE_IRQ] = board_can_error,
+            [AMPLIFIER_BREAK_IRQ] = board_break,
+            [TIMEBASE_TICK_IRQ] = board_tick,
+            [USART1_IRQ] = board_serial,
+        },
+};

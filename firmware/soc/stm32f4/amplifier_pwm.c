@@ -1,0 +1,64 @@
+/* An H-bridge: TIM1's duty cycle (PA8), a direction (PB14), and the bridge's own failure line (PB12, low), which stops
+ * the timer's output without any software. */
+#include "amplifier.h"
+#include "amplifier_enable.h"
+
+#define FREQUENCY_HZ 20000u
+#define TIMER 1u /* alternate function */
+#define PWM_PIN 8u
+#define DIRECTION_PIN 14u
+#define BREAK_PIN 12u
+
+static void write_duty(int32_t part, int32_t whole)
+{
+    const int32_t size = part < 0 ? -part : part;
+    const uint32_t period = TIM1->ARR + 1u;
+    pin_write(GPIOB, DIRECTION_PIN, part < 0);
+    TIM1->CCR1 = size < whole ? (uint32_t)size * period / (uint32_t)whole : period;
+}
+
+void amplifier_hold(void)
+{
+    enable_hold();
+}
+
+void amplifier_start(const struct clock *clock, const struct amplifier_scale *scale)
+{
+    (void)scale;
+    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOAEN;
+    RCC->APB2ENR |= RCC_APB2ENR_TIM1EN;
+    TIM1->ARR = clock->apb2_timers_Hz / FREQUENCY_HZ - 1u;
+    TIM1->CCMR1 = (TIM_CCMR1_OC1M_PWM1 << TIM_CCMR1_OC1M_POS) | TIM_CCMR1_OC1PE;
+    TIM1->CCER = TIM_CCER_CC1E;
+    TIM1->BDTR = TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE; /* no MOE: low until somebody arms */
+    TIM1->EGR = TIM_EGR_UG;
+    TIM1->SR = 0;
+    TIM1->DIER = TIM_DIER_BIE;
+    TIM1->CR1 = TIM_CR1_ARPE | TIM_CR1_CEN;
+    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER);
+    pin_set_up(GPIOB, DIRECTION_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
+    pin_set_up(GPIOA, PWM_PIN, PIN_ALTERNATE, PIN_DOWN, TIMER);
+}
+
+void amplifier_off(const struct amplifier_scale *scale)
+{
+    enable_low();
+    TIM1->BDTR &= ~TIM_BDTR_MOE; /* at once; a duty cycle waits for the next period */
+    write_duty(0, scale->full_scale_mV);
+}
+
+void amplifier_on(const struct amplifier_scale *scale, int16_t voltage_mV)
+{
+    write_duty(voltage_mV, scale->full_scale_mV);
+    if (!pin_written(GPIOB, ENABLE_PIN)) { /* only when it begins: what stopped the timer stays stopped */
+        TIM1->BDTR |= TIM_BDTR_MOE;
+        enable_high();
+    }
+}
+
+bool amplifier_broken(void)
+{
+    const bool broken = (TIM1->SR & TIM_SR_BIF) != 0u || !pin_read(GPIOB, BREAK_PIN);
+    TIM1->SR = ~TIM_SR_BIF;
+    return broken;
+}
