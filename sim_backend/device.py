@@ -19,6 +19,7 @@ from sim_backend.pins import Pins
 from sim_backend.plant_port import OUTPUT, PLANT_TIME, TICK, Output
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import TracebackType
 
     from dcmp_hil.clock import Clock
@@ -55,6 +56,8 @@ class VirtualDevice:
         Counts, what the encoder shows where the arm is at 0 rad.
     start_us
         us, of the firmware's clock at the first tick.
+    program
+        A command that takes the native board's arguments; by default the native board itself.
     """
 
     def __init__(
@@ -67,10 +70,12 @@ class VirtualDevice:
         symlink: Path | None = None,
         count_offset: int = 0,
         start_us: int = 0,
+        program: Sequence[str] = (),
     ) -> None:
         self._config = board_config(rig, NATIVE)
         self._link, self._symlink, self._patience_ms = link, symlink, patience_ms
         self._clock = clock
+        self._program = program
         self._pace = None if clock is None else Pace(clock, rig.period)
         self.pins = Pins(rig, count_offset)
         self.now_us = start_us & _WORD
@@ -97,13 +102,13 @@ class VirtualDevice:
         ConfigError
             If the symlink cannot be made.
         """
-        program = firmware.program()
+        program = self._program or [str(firmware.program())]
         ours, theirs = socket.socketpair()
         fields = [f"{name}={value}" for name, value in self._config.items()]
         arguments = ["--link", self._link, "--plant-fd", str(theirs.fileno()), *fields]
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own program
-                [program, *arguments],
+                [*program, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -113,7 +118,7 @@ class VirtualDevice:
         except OSError as error:
             ours.close()
             raise OpenError(
-                f"{program}: {error.strerror or error}. Point XDG_CACHE_HOME at a folder that "
+                f"{program[0]}: {error.strerror or error}. Point XDG_CACHE_HOME at a folder that "
                 "programs may be started from."
             ) from error
         finally:

@@ -66,6 +66,21 @@ struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
     return app_settle(app, tick->now_us);
 }
 
+static void count_frames(struct app *app, const uint8_t *bytes, size_t length)
+{
+    const uint8_t end = app->port.carrier == DCMP_CARRIER_COBS ? 0u : (uint8_t)'\r';
+    for (size_t i = 0; i < length; i++) {
+        if (bytes[i] != end) {
+            app->inside = true;
+        } else if (app->inside) {
+            app->inside = false;
+            app->frames++;
+        } else {
+            /* an end behind an end */
+        }
+    }
+}
+
 struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us)
 {
     uint8_t bytes[CHUNK];
@@ -76,6 +91,7 @@ struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us)
     if (!ring_put(&app->sending, replies, replied)) {
         dcmp_device_overrun(&app->device);
     }
+    count_frames(app, bytes, length);
     app->life.receptions++;
     app_say(app);
     return app_settle(app, now_us);
@@ -89,4 +105,3 @@ void app_say(struct app *app)
         dcmp_port_transmit(&app->port, &app->device, bytes, room < sizeof bytes ? room : sizeof bytes);
     ring_put(&app->sending, bytes, length); /* there is room */
 }
-

@@ -6,20 +6,7 @@
 #include "startup.h"
 #include "timebase.h"
 #include "usart.h"
-
-#define EXCEPTIONS 14u /* of the processor itself, behind reset */
-#define INTERRUPTS 82u
-
-typedef void handler(void);
-
-struct vectors {
-    const uint32_t *stack;
-    handler *reset;
-    handler *exceptions[EXCEPTIONS];
-    handler *interrupts[INTERRUPTS];
-};
-
-extern const struct vectors vectors;
+#include "vectors.h"
 
 const struct vectors vectors __attribute__((section(".vectors"), used)) = {
     .stack = stack_end,

@@ -67,5 +67,9 @@ bool nvm_write(uint32_t sector, uint32_t at, const uint32_t *words, uint32_t cou
         to[i] = words[i];
         good = finished();
     }
-    return end(good);
+    good = end(good);
+    for (uint32_t i = 0; i < count && good; i++) {
+        good = to[i] == words[i];
+    }
+    return good;
 }

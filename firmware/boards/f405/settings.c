@@ -25,12 +25,12 @@ static const struct record unknown = {
     .full_scale_mV = 10000,
 };
 
-static struct settings from_record(const struct record *record, int32_t reset_cause)
+static struct settings from_record(const struct record *record, int32_t board, int32_t reset_cause)
 {
     const struct settings settings = {
         .config =
             {
-                .board = BOARD_NUMBER,
+                .board = board,
                 .boot_count = record->boot_count,
                 .reset_cause = reset_cause,
                 .counts_per_rev = record->counts_per_rev,
@@ -62,33 +62,46 @@ static bool is_possible(const struct record *record)
     return paced && scaled && linked && record->voltage_limit_mV <= record->full_scale_mV && record->node <= 15u;
 }
 
-/* The same record with one boot more, behind the newest. */
-static bool count_boot(const struct record *const sectors[RECORD_SECTORS], const struct record *newest)
+static const struct record *newest(void)
 {
-    const struct record_place place = record_next(sectors, PLACES, newest);
-    struct record next = *newest;
+    const struct record *const sectors[RECORD_SECTORS] = {nvm_sector(0u), nvm_sector(1u)};
+    return record_newest(sectors, PLACES);
+}
+
+struct settings settings_read(int32_t board, int32_t reset_cause)
+{
+    const struct record *found = newest();
+    if (found != 0 && is_possible(found)) {
+        const struct settings settings = from_record(found, board, reset_cause);
+        if (dcmp_config_valid(&settings.config)) {
+            return settings;
+        }
+    }
+    struct settings weak = from_record(&unknown, board, reset_cause);
+    weak.failure = found == 0 ? APP_NO_RECORD : APP_BAD_RECORD;
+    return weak;
+}
+
+/* A record behind the newest. */
+static bool append(const struct record *record)
+{
+    const struct record *const sectors[RECORD_SECTORS] = {nvm_sector(0u), nvm_sector(1u)};
+    const struct record_place place = record_next(sectors, PLACES, newest());
+    return (!place.blank_first || nvm_erase(place.sector)) &&
+           nvm_write(place.sector, place.index * sizeof(struct record), (const uint32_t *)record, RECORD_WORDS);
+}
+
+void settings_count_boot(struct settings *settings)
+{
+    if (settings->failure != APP_WELL) {
+        return; /* there is nothing worth writing */
+    }
+    struct record next = *newest();
     next.sequence++;
     next.boot_count++;
     record_seal(&next);
-    return (!place.blank_first || nvm_erase(place.sector)) &&
-           nvm_write(place.sector, place.index * sizeof(struct record), (const uint32_t *)&next, RECORD_WORDS);
-}
-
-struct settings settings_load(int32_t reset_cause)
-{
-    const struct record *const sectors[RECORD_SECTORS] = {nvm_sector(0u), nvm_sector(1u)};
-    const struct record *found = record_newest(sectors, PLACES);
-    const struct record *record = found != 0 && is_possible(found) ? found : &unknown;
-    struct settings settings = from_record(record, reset_cause);
-    if (record == found && !dcmp_config_valid(&settings.config)) {
-        record = &unknown;
-        settings = from_record(record, reset_cause);
+    settings->config.boot_count = next.boot_count;
+    if (!append(&next)) {
+        settings->failure = APP_NO_MEMORY;
     }
-    if (record == &unknown) {
-        settings.failure = found == 0 ? APP_NO_RECORD : APP_BAD_RECORD;
-    } else {
-        settings.config.boot_count++;
-        settings.failure = count_boot(sectors, found) ? APP_WELL : APP_NO_MEMORY;
-    }
-    return settings;
 }

@@ -1,0 +1,23 @@
+/* What a board with this chip is built with, and what its record in flash memory says. */
+#ifndef SETTINGS_H
+#define SETTINGS_H
+
+#include "amplifier.h"
+#include "dcmp_device.h"
+#include "record.h"
+
+struct settings {
+    struct dcmp_config config;
+    struct amplifier_scale scale;
+    enum record_link link;
+    uint32_t baud;
+    int32_t failure; /* enum app_failure */
+};
+
+/* Read the record; without a good one, the settings are weak and their `failure` says so. */
+struct settings settings_read(int32_t board, int32_t reset_cause);
+
+/* Count this boot, in a new record. Takes up to half a second, once in some two hundred boots. */
+void settings_count_boot(struct settings *settings);
+
+#endif
