@@ -1,7 +1,7 @@
 """`python -m tools.qemu_device`: the qemu_f405 board in QEMU, in the place of the native board's program.
 
-Takes the native board's arguments and one more, `--elf`: the host is behind a pseudo terminal whose path is the first line
-printed, the plant at the plant port. `sim_backend.device.VirtualDevice(program=...)` runs it.
+Takes the native board's arguments and one more, `--elf`: the host is behind a pseudo terminal whose path is
+the first line printed, the plant at the plant port. `sim_backend.device.VirtualDevice(program=...)` runs it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,13 @@ import sys
 import tempfile
 import tty
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sim_backend.plant_port import OUTPUT
 from tools.record import ADDRESS, RecordLink, image, record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 QEMU, INSTALL = "qemu-system-arm", "apt install --no-install-recommends qemu-system-arm"
 _CHUNK = 4096
@@ -37,11 +41,33 @@ def command(elf: Path, record_file: Path, host_fd: int, plant_fd: int) -> list[s
     ]  # fmt: skip
 
 
+class Outlet:
+    """Where bytes go: what its reader has no room for is lost, but for the rest of what has begun."""
+
+    def __init__(self, end: int) -> None:
+        self._end, self._rest = end, b""
+        os.set_blocking(end, False)
+
+    def write(self, data: bytes) -> None:
+        """Write all of it, or as much as there is room for and the rest later, or nothing."""
+        if self._put(self._rest) and data:
+            self._put(data)
+
+    def _put(self, data: bytes) -> bool:
+        try:
+            written = os.write(self._end, data) if data else 0
+        except BlockingIOError:
+            written = 0
+        begun = written or data is self._rest
+        self._rest = data[written:] if begun else b""
+        return not self._rest
+
+
 def carry(terminal: int, board_host: socket.socket, plant: socket.socket, board_plant: socket.socket) -> None:
     """Carry bytes between the terminal and the board, the plant and the board, until one of them has gone."""
-    ways = {
-        terminal: board_host.fileno(), board_host.fileno(): terminal,
-        plant.fileno(): board_plant.fileno(), board_plant.fileno(): plant.fileno(),
+    ways: dict[int, Callable[[bytes], object]] = {
+        terminal: board_host.sendall, board_host.fileno(): Outlet(terminal).write,
+        plant.fileno(): board_plant.sendall, board_plant.fileno(): plant.sendall,
     }  # fmt: skip
     poll = select.poll()
     for end in ways:
@@ -51,7 +77,7 @@ def carry(terminal: int, board_host: socket.socket, plant: socket.socket, board_
             data = os.read(end, _CHUNK)
             if not data:
                 return
-            os.write(ways[end], data)
+            ways[end](data)
 
 
 def _arguments() -> argparse.Namespace:

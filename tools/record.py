@@ -17,8 +17,8 @@ MAGIC = int.from_bytes(b"DCMP", "little")
 _CHECKED, _WORD = Struct("<2I8i3I2i16x"), Struct("<I")
 RECORD_BYTES = _CHECKED.size + _WORD.size
 _CONFIG = (
-    "counts_per_rev", "period_us", "voltage_limit_mV", "slew_mV_per_ms", "watchdog_ms", "speed_limit_counts_s",
-    "travel_limit_counts", "node",
+    "counts_per_rev", "period_us", "voltage_limit_mV", "slew_mV_per_ms", "watchdog_ms",
+    "speed_limit_counts_s", "travel_limit_counts", "node",
 )  # fmt: skip
 
 
@@ -34,7 +34,7 @@ def record(
     link: RecordLink = RecordLink.cobs,
     baud: int = 1_000_000,
     zero_code: int = 2048,
-    full_scale_mV: int = 10_000,  # noqa: N803
+    full_scale_mV: int = 10_000,
     boot_count: int = 0,
     sequence: int = 1,
 ) -> bytes:

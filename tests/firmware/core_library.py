@@ -1,4 +1,4 @@
-"""The firmware's core as a library: built by the C compiler, reached through cffi."""
+"""The firmware's core and what boards with a chip share: built by the C compiler, reached through cffi."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from cffi import FFI
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "firmware" / "core"
+APP = ROOT / "firmware" / "app"
 HERE = Path(__file__).resolve().parent
 DBC = ROOT / "firmware" / "proto" / "dcmp.dbc"
 
@@ -53,12 +54,28 @@ def sources() -> list[Path]:
     return sorted(CORE.glob("*.c"))
 
 
+def app_sources() -> list[Path]:
+    """Return the C files that boards with a chip share."""
+    return sorted(APP.glob("*.c"))
+
+
 def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
     """Compile the core and more files, each into an object of its own."""
     objects = []
-    for source in [*sources(), *more]:
+    for source in [*sources(), *app_sources(), *more]:
         built = folder / f"{source.stem}.o"
-        command = [compiler(), *WARNINGS, *flags, "-fPIC", f"-I{CORE}", "-c", str(source), "-o", str(built)]
+        command = [
+            compiler(),
+            *WARNINGS,
+            *flags,
+            "-fPIC",
+            f"-I{CORE}",
+            f"-I{APP}",
+            "-c",
+            str(source),
+            "-o",
+            str(built),
+        ]
         subprocess.run(command, check=True, cwd=folder)
         objects.append(built)
     return objects
@@ -77,8 +94,9 @@ def build(folder: Path, kind: str) -> Path:
 @functools.cache
 def declarations() -> str:
     """Return every declaration of the core, preprocessed without the system's headers, which cffi knows."""
-    command = [compiler(), "-E", "-P", "-nostdinc", f"-I{CORE}", f"-I{HERE}", f"-I{HERE / 'no_headers'}", "-"]
-    text = '#include "core_checks.h"\n'
+    folders = [f"-I{folder}" for folder in (CORE, APP, HERE, HERE / "no_headers")]
+    command = [compiler(), "-E", "-P", "-nostdinc", "-D_Atomic=", *folders, "-"]  # cffi knows no _Atomic
+    text = '#include "core_checks.h"\n#include "app.h"\n#include "record.h"\n'
     return subprocess.run(command, check=True, input=text, capture_output=True, text=True).stdout
 
 

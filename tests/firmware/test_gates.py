@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.firmware.core_library import HERE, PREBUILT, ROOT, build, compiler, sources
+from tests.firmware.core_library import HERE, PREBUILT, ROOT, app_sources, build, compiler, sources
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,7 +69,7 @@ def _counted(folder: Path) -> dict[str, dict[str, Any]]:
     gcov = shutil.which("gcov")
     assert gcov is not None, "gcov belongs to gcc: apt install gcc"
     files = {}
-    for source in sources():
+    for source in [*sources(), *app_sources()]:
         command = [
             gcov,
             "--branch-probabilities",
@@ -88,7 +88,7 @@ def test_every_line_and_branch(tmp_path: Path) -> None:
     files = _counted(tmp_path)
     missing = []
     print(f"\n{'file':24}{'lines':>12}{'branches':>12}")  # noqa: T201
-    for source in sources():
+    for source in [*sources(), *app_sources()]:
         lines = files[str(source)]["lines"]
         branches = [(line["line_number"], branch["count"]) for line in lines for branch in line["branches"]]
         dead = {line["line_number"] for line in lines if not line["count"]}

@@ -25,7 +25,7 @@ struct board {
     struct plant_tick tick;
     struct dcmp_output output;
     uint32_t since_us;
-    bool changed; /* the output, since the plant was told */
+    volatile bool changed; /* the output, since the plant was told */
 };
 
 static struct board board;
@@ -171,6 +171,16 @@ static void start(void)
     interrupt_enable(BOARD_TICK_IRQ, INTERRUPTS_CORE);
 }
 
+/* Unless there is something to do already; what comes in between waits, and wakes. */
+static void sleep(void)
+{
+    interrupts_mask();
+    if (ring_room(&board.plant_said) == RING_BYTES && !board.changed) {
+        interrupts_wait();
+    }
+    interrupts_unmask();
+}
+
 void board_main(void)
 {
     uint8_t bytes[PLANT_TICK_BYTES];
@@ -178,9 +188,7 @@ void board_main(void)
     start();
     tell_plant(true); /* it may begin */
     for (;;) {
-        interrupts_mask();
-        interrupts_wait();
-        interrupts_unmask();
+        sleep();
         pump(USART1, &board.app.sending);
         if (plant_rings(bytes, &length)) {
             serve_tick();
