@@ -1,9 +1,27 @@
-"""Fixtures for every test."""
+"""Fixtures for every test, and the figures that tests measure, at the end of what is printed."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
+
+FIGURE = "figure"
+
+
+@pytest.fixture
+def figure(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
+    """Give a way to have a line printed at the end: a size, a count, what CI's output is to keep track of."""
+    return lambda line: record_property(FIGURE, line)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print the figures of the tests that passed, whichever worker ran them."""
+    passed = terminalreporter.stats.get("passed", [])
+    lines = sorted(str(line) for report in passed for name, line in report.user_properties if name == FIGURE)
+    if lines:
+        terminalreporter.section("figures")
+        for line in lines:
+            terminalreporter.line(line)
 
 
 @pytest.fixture

@@ -21,7 +21,12 @@ function(dcmp_board name)
     target_link_options(${name} PRIVATE -nostdlib -nostartfiles -T${LINKER_SCRIPT} -Wl,--gc-sections
                         -Wl,--fatal-warnings -Wl,--print-memory-usage -Wl,-Map=${name}.map)
     target_link_libraries(${name} PRIVATE core gcc)
-    add_custom_command(TARGET ${name} POST_BUILD COMMAND ${CMAKE_OBJCOPY} -O binary $<TARGET_FILE:${name}> ${name}.bin)
+    # Two pieces for flashing, with the board's record between them, and one image of both for an empty chip.
+    add_custom_command(
+      TARGET ${name} POST_BUILD
+      COMMAND ${CMAKE_OBJCOPY} -O binary -j .vectors $<TARGET_FILE:${name}> ${name}.vectors.bin
+      COMMAND ${CMAKE_OBJCOPY} -O binary -R .vectors $<TARGET_FILE:${name}> ${name}.code.bin
+      COMMAND ${CMAKE_OBJCOPY} -O binary --gap-fill 0xFF -R .stack -R .bss -R .noinit $<TARGET_FILE:${name}> ${name}.bin)
   endif()
   target_include_directories(${name} PRIVATE app soc/stm32f4 boards/f405)
 endfunction()

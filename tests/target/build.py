@@ -12,6 +12,7 @@ import pytest
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 _PACKAGES = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "arm-none-eabi-nm": "binutils-arm-none-eabi",
     "clang": "clang",
     "cmake": "cmake",
     "qemu-system-arm": "qemu-system-arm",

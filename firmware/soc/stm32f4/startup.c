@@ -7,8 +7,7 @@
 
 /* Where the linker script says that things are. */
 extern uint32_t stack_start[];
-extern uint32_t data_start[], data_end[], bss_start[], bss_end[];
-extern const uint32_t data_image[];
+extern uint32_t bss_start[], bss_end[];
 
 void *memcpy(void *restrict to, const void *restrict from, size_t length);
 void *memset(void *to, int value, size_t length);
@@ -50,9 +49,6 @@ _Noreturn void startup_reset(void)
     board_hold();
     fill(stack_start, words(stack_start, stack_end) - IN_USE, PAINT);
     fill(bss_start, words(bss_start, bss_end), 0u);
-    for (size_t i = 0; i < words(data_start, data_end); i++) {
-        data_start[i] = data_image[i];
-    }
     board_main();
     for (;;) { /* it does not return */
     }

@@ -1,0 +1,135 @@
+"""What is written into a board, and by what; no programmer is at hand, so the commands are looked at."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dcmp_hil import load_rig
+from dcmp_hil.errors import ConfigError
+from tools import flash
+from tools.flash import CODE, VECTORS, Piece, commands, record_of
+from tools.record import ADDRESS, SECTOR_BYTES, RecordLink, image, record
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DAC = "bench_f405_dac"
+LINK_AT, BAUD_AT, ZERO_AT, FULL_AT = 44, 48, 52, 56
+
+
+def word(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + 4], "little")
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    for piece in ("code", "vectors"):
+        (tmp_path / f"{DAC}.{piece}.bin").write_bytes(piece.encode())
+    return tmp_path
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr("sys.argv", ["flash", *arguments])
+    return flash.main()
+
+
+@pytest.mark.parametrize(
+    ("rig", "sets", "link", "baud"),
+    [
+        ("bench-serial", ["backend.baud=500000"], RecordLink.cobs, 500_000),
+        ("bench-can", [], RecordLink.can, 1_000_000),
+        ("bench-can", ["backend.interface=slcan", "backend.channel=/dev/x"], RecordLink.slcan, 1_000_000),
+    ],
+)
+def test_record_is_that_of_the_rig(rig: str, sets: list[str], link: RecordLink, baud: int) -> None:
+    made = record_of(load_rig(rig, sets), DAC, zero_code=2050, full_scale_V=12.0)
+    assert (word(made, LINK_AT), word(made, BAUD_AT)) == (link, baud)
+    assert (word(made, ZERO_AT), word(made, FULL_AT)) == (2050, 12_000)
+
+
+def test_record_refuses_what_the_board_cannot_put_out() -> None:
+    with pytest.raises(ConfigError, match=r"got 10; expected 5 V or less.*--full-scale-V"):
+        record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=5.0)
+
+
+def test_record_refuses_a_rig_without_a_device() -> None:
+    with pytest.raises(ConfigError, match="a board is at serial or can"):
+        record_of(load_rig("bench-1khz"), DAC, zero_code=2048, full_scale_V=10.0)
+
+
+def test_record_fills_its_two_sectors_and_no_more() -> None:
+    made = image(record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=10.0))
+    assert ADDRESS + len(made) == CODE
+    assert len(made) == 2 * SECTOR_BYTES
+    assert set(made[SECTOR_BYTES:]) == {0xFF}  # older records are gone with it
+
+
+def test_commands_write_every_piece_at_its_address(tmp_path: Path) -> None:
+    pieces = [Piece(tmp_path / "a.bin", CODE), Piece(tmp_path / "b.bin", VECTORS)]
+    serial = commands("stm32flash", pieces, "/dev/ttyUSB7")
+    assert [command[-2:] for command in serial] == [
+        ["0x800c000", "/dev/ttyUSB7"], ["0x8000000", "/dev/ttyUSB7"], ["0x8000000", "/dev/ttyUSB7"],
+    ]  # fmt: skip
+    assert "-v" in serial[0]
+    assert "-g" in serial[-1]
+    probe = commands("pyocd", pieces, "")
+    assert [command[-2:] for command in probe] == [
+        ["0x800c000", str(tmp_path / "a.bin")],
+        ["0x8000000", str(tmp_path / "b.bin")],
+    ]
+
+
+def test_dry_run_shows_what_would_be_done(
+    built: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, DAC, "bench-serial", "--firmware", str(built), "--dry-run") == 0
+    said = capsys.readouterr().out
+    assert [line.split(" -S ")[-1].split()[0] for line in said.splitlines()[:3]] == [
+        "0x8004000", "0x800c000", "0x8000000",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["bench-serial", "--firmware", "nowhere"], 2, "make firmware"),
+        (["bench-1khz"], 2, "Start from bench-serial"),
+        (["bench-serial", "--only", "record", "--by", "pyocd"], 3, "pip install pyocd"),
+    ],
+)
+def test_mistake_is_one_line_with_its_remedy(
+    arguments: list[str],
+    code: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    assert run(monkeypatch, DAC, *arguments) == code
+    assert said in capsys.readouterr().err
+
+
+def test_programmer_that_fails_ends_it(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tool = tmp_path / "stm32flash"
+    tool.write_text("#!/bin/sh\nexit 1\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+    assert run(monkeypatch, DAC, "bench-serial", "--firmware", str(built)) == 3
+    said = capsys.readouterr()
+    assert "BOOT0" in said.err
+    assert len(said.out.splitlines()) == 1  # the next piece is not tried
+
+
+def test_record_says_how_old_it_is() -> None:
+    made = record(
+        {
+            "counts_per_rev": 1, "period_us": 2, "voltage_limit_mV": 3, "slew_mV_per_ms": 4, "watchdog_ms": 5,
+            "speed_limit_counts_s": 6, "travel_limit_counts": 7, "node": 8,
+        },
+        boot_count=9, sequence=10,
+    )  # fmt: skip
+    assert (word(made, 4), word(made, 8)) == (10, 9)

@@ -1,0 +1,83 @@
+"""`python -m tools.artefact`: build the firmware for its boards and put what is released into a folder."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+
+FIRMWARE = Path(__file__).resolve().parent.parent / "firmware"
+BOARDS = ("bench_f405_dac", "bench_f405_pwm")
+PIECES = ("elf", "bin", "vectors.bin", "code.bin", "map")
+INSTALL = "apt install --no-install-recommends cmake gcc-arm-none-eabi"
+_USE = re.compile(r"^\s*(\w+):\s+(\d+) B\s+(\d+) (KB|MB|B)", re.MULTILINE)
+
+
+def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
+    """Build the preset f405 in a folder; return what each board takes of each memory, bytes.
+
+    Raises
+    ------
+    RuntimeError
+        If a tool is missing or fails.
+    """
+    for tool in ("cmake", "arm-none-eabi-gcc"):
+        if shutil.which(tool) is None:
+            raise RuntimeError(f"no {tool} here: {INSTALL}")
+    said = ""
+    for command in (
+        ["cmake", "--preset", "f405", "-B", str(folder)],
+        ["cmake", "--build", str(folder), "--clean-first"],
+    ):
+        done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)  # noqa: S603
+        said += done.stdout
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+    uses = [{region: int(used) for region, used, *_ in _USE.findall(part)} for part in said.split("Linking")]
+    linked = re.findall(r"Linking C executable (\w+)\.elf", said)
+    return dict(zip(linked, uses[-len(linked) :], strict=True))
+
+
+def release(built: Path, target: Path, sizes: dict[str, dict[str, int]]) -> dict[str, object]:
+    """Copy what is released; return what is known of it, as it stands in `manifest.json`."""
+    target.mkdir(parents=True, exist_ok=True)
+    manifest: dict[str, object] = {"protocol_hash": f"0x{PROTOCOL_HASH:08x}", "boards": {}}
+    for board in BOARDS:
+        files = {}
+        for piece in PIECES:
+            data = (built / f"{board}.{piece}").read_bytes()
+            (target / f"{board}.{piece}").write_bytes(data)
+            files[f"{board}.{piece}"] = hashlib.sha256(data).hexdigest()
+        manifest["boards"][board] = {"bytes": sizes[board], "sha256": files}  # type: ignore[index]
+    (target / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n", "utf-8")
+    return manifest
+
+
+def main() -> int:
+    """Build, copy, and say how large it is."""
+    parser = argparse.ArgumentParser(prog="python -m tools.artefact", description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("dist/firmware"))
+    folder = parser.parse_args().folder.resolve()
+    try:
+        sizes = compile_boards(FIRMWARE / "build/f405")
+    except RuntimeError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 3
+    release(FIRMWARE / "build/f405", folder, sizes)
+    for board, use in sizes.items():
+        sys.stdout.write(
+            f"{board:16}" + "".join(f"{name:>10} {used:6} B" for name, used in use.items()) + "\n"
+        )
+    sys.stdout.write(f"protocol 0x{PROTOCOL_HASH:08x}, in {folder}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

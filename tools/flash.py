@@ -1,0 +1,153 @@
+"""`python -m tools.flash`: write a board's program, and the record of what is connected to it.
+
+By default over the chip's own serial boot loader (BOOT0 high at reset, PA9 and PA10); with `--by pyocd` over
+a debug probe.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil import load_rig
+from dcmp_hil.errors import ConfigError
+from sim_backend.board_config import board_config
+from tools.artefact import BOARDS
+from tools.record import ADDRESS, RecordLink, image, record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.config import Rig
+
+VECTORS, CODE = 0x0800_0000, 0x0800_C000
+INSTALL = {
+    "stm32flash": "apt install --no-install-recommends stm32flash",
+    "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
+}
+_BOOTLOADER_BAUD = 115_200
+_DAC, _PWM = BOARDS
+
+
+class Piece(NamedTuple):
+    """What is written where."""
+
+    file: Path
+    address: int
+
+
+def record_of(rig: Rig, board: str, *, zero_code: int, full_scale_V: float) -> bytes:
+    """Return the record of a board that fits a rig.
+
+    Parameters
+    ----------
+    zero_code
+        The DAC's code at which the amplifier puts out 0 V.
+    full_scale_V
+        V, that 2048 codes more put out; of a PWM board: the motor's supply.
+
+    Raises
+    ------
+    ConfigError
+        If the rig is not one for a device, or asks for more than the board can put out.
+    """
+    kind = rig.backend.kind
+    if kind not in ("serial", "can"):
+        raise ConfigError(
+            f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
+        )
+    config = board_config(rig, BOARDS.index(board) + 3)
+    full_scale_mV = round(1e3 * full_scale_V)
+    if config["voltage_limit_mV"] > full_scale_mV:
+        raise ConfigError(
+            f"amplifier.voltage_limit_V: got {1e-3 * config['voltage_limit_mV']:g}; expected "
+            f"{full_scale_V:g} V or less, the board's full scale. Lower it, or say --full-scale-V."
+        )
+    slcan = getattr(rig.backend, "interface", "") == "slcan"
+    link = RecordLink.cobs if kind == "serial" else RecordLink.slcan if slcan else RecordLink.can
+    baud = getattr(rig.backend, "baud", None) or getattr(rig.backend, "tty_baud", None) or 1_000_000
+    return record(config, link=link, baud=baud, zero_code=zero_code, full_scale_mV=full_scale_mV)
+
+
+def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
+    """Return what writes the pieces, the rest of the memory left alone; the last one starts the board."""
+    if by == "pyocd":
+        to = ["--target", "stm32f405rg", "--format", "bin", "--base-address"]
+        return [["pyocd", "flash", *to, f"{piece.address:#x}", str(piece.file)] for piece in pieces]
+    talk = ["stm32flash", "-b", str(_BOOTLOADER_BAUD)]
+    writes = [[*talk, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port] for piece in pieces]
+    return [*writes, [*talk, "-g", f"{VECTORS:#x}", port]]
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tools.flash", description=__doc__)
+    parser.add_argument("board", choices=BOARDS)
+    parser.add_argument("rig", help="whose limits and link the board is to have: a name, or a rig.toml")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets")
+    parser.add_argument("--full-scale-V", type=float, default=10.0, dest="full_scale_V", help="default: 10")
+    parser.add_argument("--zero-code", type=int, default=2048, help="of the DAC (default: 2048)")
+    parser.add_argument("--by", choices=tuple(INSTALL), default="stm32flash")
+    parser.add_argument("--port", default="/dev/ttyUSB0", help="of the boot loader (default: /dev/ttyUSB0)")
+    parser.add_argument("--firmware", type=Path, default=Path("dist/firmware"), help="made by make firmware")
+    parser.add_argument("--only", choices=("record", "program"), help="write one of the two")
+    parser.add_argument("--dry-run", action="store_true", help="show the commands")
+    return parser.parse_args()
+
+
+def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
+    pieces = []
+    if asked.only != "program":
+        rig = load_rig(asked.rig, asked.sets)
+        kept = folder / "record.bin"
+        made = record_of(rig, asked.board, zero_code=asked.zero_code, full_scale_V=asked.full_scale_V)
+        kept.write_bytes(image(made))
+        pieces.append(Piece(kept, ADDRESS))
+    if asked.only != "record":
+        base = asked.firmware / asked.board
+        parts = [Piece(Path(f"{base}.code.bin"), CODE), Piece(Path(f"{base}.vectors.bin"), VECTORS)]
+        missing = [part.file for part in parts if not part.file.is_file()]
+        if missing:
+            raise ConfigError(
+                f"{missing[0]}: there is no such file. Say `make firmware` first, or --firmware."
+            )
+        pieces += parts  # the vectors last: an empty board that was half written does not start
+    return pieces
+
+
+def _run(command: list[str]) -> None:
+    tool = command[0]
+    if shutil.which(tool) is None:
+        raise RuntimeError(f"no {tool} here: {INSTALL[tool]}")
+    if subprocess.run(command, check=False).returncode:  # noqa: S603
+        raise RuntimeError(
+            f"{' '.join(command)} failed. Look whether BOOT0 is high and the board was reset, the port is "
+            "right, the probe is plugged in."
+        )
+
+
+def main() -> int:
+    """Write, or show what would."""
+    asked = _arguments()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            pieces = _pieces(asked, Path(folder))
+            for command in commands(asked.by, pieces, asked.port):
+                sys.stdout.write(" ".join(command) + "\n")
+                if not asked.dry_run:
+                    _run(command)
+        except ConfigError as error:
+            sys.stderr.write(f"error: {error}\n")
+            return 2
+        except RuntimeError as error:
+            sys.stderr.write(f"error: {error}\n")
+            return 3
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
