@@ -40,7 +40,10 @@ _MEANINGS = {
     Fault.BREAK_INPUT: Meaning(
         "The amplifier's own protection acted", "Look at motor current, temperature and supply."
     ),
-    Fault.INTERNAL: Meaning("The firmware found itself in trouble", "Switch it off and on; report it."),
+    Fault.INTERNAL: Meaning(
+        "The board found something wrong with itself",
+        "firmware/README.md says what its detail means: 1 no crystal, 2 nobody wrote its record, ...",
+    ),
     Fault.DISARMED: Meaning(
         "The device left RUN by itself and names no fault, as after a reset",
         "Look at its supply (brown-out?) and at its reset button.",

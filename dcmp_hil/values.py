@@ -17,7 +17,7 @@ class Fault(IntEnum):
     OVER_TRAVEL = 6
     ENCODER_JUMP = 7
     BREAK_INPUT = 8  # the amplifier's own protection
-    INTERNAL = 9  # the firmware found itself in trouble
+    INTERNAL = 9  # the board found something wrong with itself
     DISARMED = 254  # the device left RUN without a fault, as after a reset; never on the wire
     UNKNOWN = 255  # a code that this version does not know: treated like any other fault
 

@@ -31,7 +31,7 @@ INSTALL = {
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
 _BOOTLOADER_BAUD = 115_200
-_DAC, _PWM = BOARDS
+_NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
 
 
 class Piece(NamedTuple):
@@ -61,7 +61,7 @@ def record_of(rig: Rig, board: str, *, zero_code: int, full_scale_V: float) -> b
         raise ConfigError(
             f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
         )
-    config = board_config(rig, BOARDS.index(board) + 3)
+    config = board_config(rig, _NUMBERS[board])
     full_scale_mV = round(1e3 * full_scale_V)
     if config["voltage_limit_mV"] > full_scale_mV:
         raise ConfigError(

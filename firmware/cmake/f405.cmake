@@ -36,7 +36,7 @@ dcmp_board(bench_f405_dac ${BENCH} soc/stm32f4/amplifier_dac.c)
 dcmp_board(bench_f405_pwm ${BENCH} soc/stm32f4/amplifier_pwm.c)
 set(CRYSTAL_HZ 8000000 CACHE STRING "of the board's crystal; 2 MHz has to divide it")
 target_compile_definitions(bench_f405_dac PRIVATE BOARD_NUMBER=3 BOARD_CRYSTAL_HZ=${CRYSTAL_HZ}u)
-target_compile_definitions(bench_f405_pwm PRIVATE BOARD_NUMBER=4 BOARD_CRYSTAL_HZ=${CRYSTAL_HZ}u)
+target_compile_definitions(bench_f405_pwm PRIVATE BOARD_NUMBER=5 BOARD_CRYSTAL_HZ=${CRYSTAL_HZ}u)
 
 dcmp_board(qemu_f405 boards/qemu_f405/board.c boards/qemu_f405/vectors.c boards/f405/settings.c
            boards/native/plant_port.c)

@@ -13,7 +13,7 @@
 #include "startup.h"
 #include "usart.h"
 
-#define BOARD_NUMBER 5
+#define BOARD_NUMBER 4
 #define BAUD 1000000u
 #define MS_OF_CLOCK 168000u /* the emulator's, whatever its registers say */
 
