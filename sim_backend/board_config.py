@@ -18,7 +18,7 @@ _REV_S, _REV = 8, 4  # the board's own limits: revolutions a second, revolutions
 _MOST_MV = 32_767  # what the wire can say
 
 
-LAYOUT = struct.Struct("@10iHB?")
+LAYOUT = struct.Struct("@12iHB?")
 """Of `struct dcmp_config`: the values of `board_config`, in their order."""
 
 
@@ -49,6 +49,8 @@ def board_config(rig: Rig, board: int) -> dict[str, int]:
         "watchdog_ms": _WATCHDOG_MS,
         "speed_limit_counts_s": _REV_S * counts,
         "travel_limit_counts": _REV * counts,
+        "last_fault": 0,
+        "last_fault_detail": 0,
         "firmware_version": VERSION,
         "node": getattr(rig.backend, "node", 0),
         "edge_stamps": 0,

@@ -38,6 +38,8 @@ class Parameter(IntEnum):
     SPEED_LIMIT_COUNTS_S = 10
     TRAVEL_LIMIT_COUNTS = 11
     EDGE_STAMPS = 12
+    LAST_FAULT = 13
+    LAST_FAULT_DETAIL = 14
 
 
 class Result(IntEnum):

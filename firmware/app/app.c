@@ -2,15 +2,28 @@
 
 #define CHUNK 64u /* bytes at a time */
 
+/* What the log has of earlier boots can be asked for over the wire. */
+static struct dcmp_config with_last_fault(const struct dcmp_config *config, const struct fault_log *log)
+{
+    struct dcmp_config full = *config;
+    const struct fault_log_entry *newest = fault_log_look(log, 0u);
+    if (newest != 0) {
+        full.last_fault = (int32_t)newest->code;
+        full.last_fault_detail = newest->detail;
+    }
+    return full;
+}
+
 void app_start(struct app *app, const struct dcmp_config *config, enum dcmp_carrier carrier, struct fault_log *log,
                int32_t failure, uint32_t now_us)
 {
-    dcmp_device_init(&app->device, config, now_us);
+    fault_log_open(log);
+    const struct dcmp_config full = with_last_fault(config, log);
+    dcmp_device_init(&app->device, &full, now_us);
     dcmp_port_init(&app->port, carrier);
     app->log = log;
     app->boot_count = config->boot_count;
     app->failure = failure;
-    fault_log_open(log);
 }
 
 static bool is_faulted(const struct app *app)

@@ -24,6 +24,8 @@ struct dcmp_config {
     int32_t watchdog_ms;           /* 5..50 */
     int32_t speed_limit_counts_s;  /* 1.. */
     int32_t travel_limit_counts;   /* 1.. */
+    int32_t last_fault;            /* before this boot, as in FAULT; 0 for none that is known */
+    int32_t last_fault_detail;
     uint16_t firmware_version;     /* major * 256 + minor */
     uint8_t node;                  /* 0..15 */
     bool edge_stamps;              /* the board can time-stamp edges */

@@ -49,7 +49,9 @@ enum dcmp_parameter {
     DCMP_WATCHDOG_MS,
     DCMP_SPEED_LIMIT_COUNTS_S,
     DCMP_TRAVEL_LIMIT_COUNTS,
-    DCMP_EDGE_STAMPS
+    DCMP_EDGE_STAMPS,
+    DCMP_LAST_FAULT,
+    DCMP_LAST_FAULT_DETAIL
 };
 
 /* In the order in which they are looked for: the first that applies is answered. */

@@ -51,6 +51,8 @@ void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_
     parameters->value[DCMP_WATCHDOG_MS] = config->watchdog_ms;
     parameters->value[DCMP_SPEED_LIMIT_COUNTS_S] = config->speed_limit_counts_s;
     parameters->value[DCMP_TRAVEL_LIMIT_COUNTS] = config->travel_limit_counts;
+    parameters->value[DCMP_LAST_FAULT] = config->last_fault;
+    parameters->value[DCMP_LAST_FAULT_DETAIL] = config->last_fault_detail;
     settable(parameters, DCMP_VOLTAGE_LIMIT_MV, 1, config->voltage_limit_mV);
     settable(parameters, DCMP_SLEW_MV_PER_MS, 1, config->slew_mV_per_ms == 0 ? INT32_MAX : config->slew_mV_per_ms);
     settable(parameters, DCMP_WATCHDOG_MS, DCMP_WATCHDOG_MIN_MS, DCMP_WATCHDOG_MAX_MS);

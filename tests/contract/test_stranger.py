@@ -250,7 +250,7 @@ def test_parameters(host: Callable[..., Host]) -> None:
     assert h.get(wire.COUNTS_PER_REV) == (wire.OK, 8192)
     assert h.get(wire.PERIOD_US) == (wire.OK, 1000)
     assert h.get(wire.EDGE_STAMPS) == (wire.OK, 0)
-    assert h.get(0) == h.get(13) == (wire.UNKNOWN, 0)
+    assert h.get(0) == h.get(15) == (wire.UNKNOWN, 0)
     assert h.put(wire.VOLTAGE_LIMIT, 5000) == (wire.NOT_OWNER, 10_000)
     h.hello()
     assert h.put(99, 0, THEIRS) == (wire.UNKNOWN, 0)

@@ -27,6 +27,8 @@ CONFIG = {
     "watchdog_ms": 20,
     "speed_limit_counts_s": 40000,
     "travel_limit_counts": 20000,
+    "last_fault": 5,
+    "last_fault_detail": -41234,
     "firmware_version": 0x0102,
     "node": 0,
     "edge_stamps": True,

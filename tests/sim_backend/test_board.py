@@ -239,7 +239,7 @@ def test_configuration_is_what_the_parameters_say() -> None:
     assert got["counts_per_rev"] == 2000
     assert got["period_us"] == 2000
     assert got["slew_mV_per_ms"] == 700
-    assert len(got) == 11
+    assert len(got) == 13
 
 
 def test_number_on_the_bus_is_that_of_the_rig() -> None:

@@ -299,6 +299,8 @@ static bool take_field(struct dcmp_config *config, const char *argument)
         {"watchdog_ms", &config->watchdog_ms},
         {"speed_limit_counts_s", &config->speed_limit_counts_s},
         {"travel_limit_counts", &config->travel_limit_counts},
+        {"last_fault", &config->last_fault},
+        {"last_fault_detail", &config->last_fault_detail},
     };
     const char *equals = strchr(argument, '=');
     const long value = equals == NULL ? 0 : strtol(equals + 1, NULL, 10);

@@ -67,6 +67,10 @@ class Board:
         filled = {"seq": self.app.device.tick % 8192, "arm": 1, "clear": 0, "release": 0, "ttl_ms": 50}
         self.say("DRIVE", voltage_mV=voltage_mV, session=SESSION, **(filled | flags))
 
+    def asked(self, number: int) -> int:
+        self.say("PARAMETER_GET", id=number)
+        return next(int(fields["value"]) for name, fields in self.messages() if name == "PARAMETER_VALUE")
+
     @property
     def state(self) -> int:
         return int(self.app.device.supervisor.state)
@@ -119,6 +123,8 @@ def test_fault_is_logged_once_and_survives_a_reset(core: Core) -> None:
     assert len(board.logged()) == 1
     after = Board(core, log=board.log, boot_count=4)
     after.tick()
+    assert after.asked(13) == Fault.HOST_SILENT
+    assert after.asked(14) == age
     after.say("STOP", reason=3)
     assert [entry[:1] + entry[2:3] for entry in after.logged()] == [(4, "STOPPED"), (3, "HOST_SILENT")]
 

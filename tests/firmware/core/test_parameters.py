@@ -17,6 +17,8 @@ BUILT = {
     10: 40000,
     11: 20000,
     12: 0,
+    13: 5,
+    14: -41234,
 }
 RANGES = {7: (1, 10000), 8: (1, TOP), 9: (5, 50), 10: (1, 40000), 11: (1, 20000), 12: (0, 1)}
 
@@ -73,8 +75,8 @@ def test_who_may_and_when(core: Core) -> None:
     bench.hello()
     assert _set(bench, 9, 30, session=9) == (NOT_OWNER, 20)
     assert _set(bench, 0, 30) == (UNKNOWN, 0)
-    assert _set(bench, 13, 30) == (UNKNOWN, 0)
-    for number in range(1, 7):
+    assert _set(bench, 15, 30) == (UNKNOWN, 0)
+    for number in (*range(1, 7), 13, 14):
         assert _set(bench, number, BUILT[number]) == (READ_ONLY, BUILT[number])
     for state in (2, 3, 4):
         bench = Bench(core)
