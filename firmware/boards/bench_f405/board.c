@@ -191,8 +191,8 @@ void board_hold(void)
 
 static void start_serial(void)
 {
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOAEN;
-    RCC->APB2ENR |= RCC_APB2ENR_USART1EN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->APB2ENR, RCC_APB2ENR_USART1EN);
     usart_start(USART1, board.clock.apb2_Hz, board.settings.baud);
     pin_set_up(GPIOA, 9u, PIN_ALTERNATE, PIN_FLOATS, SERIAL_FUNCTION);
     pin_set_up(GPIOA, 10u, PIN_ALTERNATE, PIN_UP, SERIAL_FUNCTION);

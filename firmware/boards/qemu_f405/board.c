@@ -159,8 +159,8 @@ static void start(void)
     app_start(&board.app, &board.settings.config,
               board.settings.link == RECORD_SLCAN ? DCMP_CARRIER_SLCAN : DCMP_CARRIER_COBS, &fault_log,
               board.settings.failure, 0u);
-    RCC->APB1ENR |= RCC_APB1ENR_USART2EN;
-    RCC->APB2ENR |= RCC_APB2ENR_USART1EN;
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_USART2EN);
+    clock_enable(&RCC->APB2ENR, RCC_APB2ENR_USART1EN);
     usart_start(USART1, BAUD, BAUD);
     usart_start(USART2, BAUD, BAUD);
     SYSTICK->LOAD = MS_OF_CLOCK - 1u;

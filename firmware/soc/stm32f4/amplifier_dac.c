@@ -24,8 +24,8 @@ void amplifier_hold(void)
 void amplifier_start(const struct clock *clock, const struct amplifier_scale *scale)
 {
     (void)clock;
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOAEN;
-    RCC->APB1ENR |= RCC_APB1ENR_DACEN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_DACEN);
     pin_set_up(GPIOA, 4u, PIN_ANALOG, PIN_FLOATS, 0u);
     write_code(scale->zero_code);
     DAC->CR = DAC_CR_EN1;

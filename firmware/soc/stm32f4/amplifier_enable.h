@@ -2,6 +2,7 @@
 #ifndef AMPLIFIER_ENABLE_H
 #define AMPLIFIER_ENABLE_H
 
+#include "clock.h"
 #include "pins.h"
 
 #define ENABLE_PIN 15u
@@ -19,7 +20,7 @@ static inline void enable_high(void)
 /* Low before the pin becomes an output. */
 static inline void enable_hold(void)
 {
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOBEN);
     enable_low();
     pin_set_up(GPIOB, ENABLE_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
 }

@@ -25,8 +25,10 @@ void amplifier_hold(void)
 void amplifier_start(const struct clock *clock, const struct amplifier_scale *scale)
 {
     (void)scale;
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOAEN;
-    RCC->APB2ENR |= RCC_APB2ENR_TIM1EN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->APB2ENR, RCC_APB2ENR_TIM1EN);
+    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER); /* first: a pin that nobody leads there is a break */
+    pin_set_up(GPIOB, DIRECTION_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
     TIM1->ARR = clock->apb2_timers_Hz / FREQUENCY_HZ - 1u;
     TIM1->CCMR1 = (TIM_CCMR1_OC1M_PWM1 << TIM_CCMR1_OC1M_POS) | TIM_CCMR1_OC1PE;
     TIM1->CCER = TIM_CCER_CC1E;
@@ -35,8 +37,6 @@ void amplifier_start(const struct clock *clock, const struct amplifier_scale *sc
     TIM1->SR = 0;
     TIM1->DIER = TIM_DIER_BIE;
     TIM1->CR1 = TIM_CR1_ARPE | TIM_CR1_CEN;
-    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER);
-    pin_set_up(GPIOB, DIRECTION_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
     pin_set_up(GPIOA, PWM_PIN, PIN_ALTERNATE, PIN_DOWN, TIMER);
 }
 
@@ -59,6 +59,6 @@ void amplifier_on(const struct amplifier_scale *scale, int16_t voltage_mV)
 bool amplifier_broken(void)
 {
     const bool broken = (TIM1->SR & TIM_SR_BIF) != 0u || !pin_read(GPIOB, BREAK_PIN);
-    TIM1->SR = ~TIM_SR_BIF;
+    TIM1->SR = TIM1_SR_ALL & ~TIM_SR_BIF;
     return broken;
 }

@@ -1,5 +1,6 @@
 #include "bxcan.h"
 
+#include "clock.h"
 #include "pins.h"
 #include "regs.h"
 
@@ -61,8 +62,8 @@ static void let_in(const uint16_t *ids, uint32_t count)
 bool bxcan_start(uint32_t bus_Hz, const uint16_t *ids, uint32_t count)
 {
     const uint32_t timing = bit_timing(bus_Hz);
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
-    RCC->APB1ENR |= RCC_APB1ENR_CAN1EN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOBEN);
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_CAN1EN);
     pin_set_up(GPIOB, 8u, PIN_ALTERNATE, PIN_UP, CAN);
     pin_set_up(GPIOB, 9u, PIN_ALTERNATE, PIN_FLOATS, CAN);
     CAN1->MCR = CAN_MCR_INRQ | CAN_MCR_TXFP | CAN_MCR_ABOM | CAN_MCR_DBF;
@@ -82,8 +83,9 @@ bool bxcan_receive(struct dcmp_frame *frame, bool *lost)
         CAN1->RF0R = CAN_RF0R_FOVR0;
         *lost = true;
     }
-    if ((CAN1->RF0R & (3u << CAN_RF0R_FMP0_POS)) == 0u) {
-        return false;
+    const uint32_t fifo = CAN1->RF0R;
+    if ((fifo & (3u << CAN_RF0R_FMP0_POS)) == 0u || (fifo & CAN_RF0R_RFOM0) != 0u) {
+        return false; /* none, or the one before is not released yet: the interrupt comes again */
     }
     const struct can_mailbox *box = &CAN1->R[0];
     const uint32_t low = box->DLR;

@@ -59,7 +59,7 @@ static struct clock slow(void)
 
 struct clock clock_start(uint32_t crystal_Hz)
 {
-    RCC->APB1ENR |= RCC_APB1ENR_PWREN;
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_PWREN);
     PWR->CR |= PWR_CR_VOS;
     RCC->CR |= RCC_CR_HSEON;
     if (wait_for(&RCC->CR, RCC_CR_HSERDY, RCC_CR_HSERDY)) {
@@ -74,6 +74,13 @@ struct clock clock_start(uint32_t crystal_Hz)
         return fast(CLOCK_INTERNAL);
     }
     return slow();
+}
+
+void clock_enable(volatile uint32_t *enables, uint32_t bit)
+{
+    *enables |= bit;
+    (void)*enables; /* longer than the slowest bus's clock */
+    __asm volatile("dsb" ::: "memory");
 }
 
 bool clock_crystal_stopped(void)

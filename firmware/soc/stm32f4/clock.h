@@ -23,6 +23,9 @@ struct clock {
 /* Start it, once after a reset. Every wait is bounded. A crystal that stops later is an NMI. */
 struct clock clock_start(uint32_t crystal_Hz);
 
+/* Switch a peripheral's clock on, and wait until it can be spoken to: what is written at once is lost (errata). */
+void clock_enable(volatile uint32_t *enables, uint32_t bit);
+
 /* Whether an NMI says that the crystal stopped; takes note of it. */
 bool clock_crystal_stopped(void);
 

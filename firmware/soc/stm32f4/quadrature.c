@@ -1,5 +1,6 @@
 #include "quadrature.h"
 
+#include "clock.h"
 #include "pins.h"
 #include "regs.h"
 
@@ -9,8 +10,8 @@
 
 void quadrature_start(void)
 {
-    RCC->AHB1ENR |= RCC_AHB1ENR_GPIOAEN;
-    RCC->APB1ENR |= RCC_APB1ENR_TIM2EN;
+    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_TIM2EN);
     pin_set_up(GPIOA, 0u, PIN_ALTERNATE, PIN_UP, ENCODER); /* many encoders have open collectors */
     pin_set_up(GPIOA, 1u, PIN_ALTERNATE, PIN_UP, ENCODER);
     TIM2->CCMR1 = (TIM_CCMR_S_OWN << TIM_CCMR1_CC1S_POS) | (FILTER << TIM_CCMR1_IC1F_POS) |

@@ -2,6 +2,9 @@
 
 #include <stddef.h>
 
+#include "regs.h"
+#include "vectors.h"
+
 #define PAINT 0xC5C5C5C5u
 #define IN_USE 32u /* words of the stack that this file itself may be in */
 
@@ -47,6 +50,7 @@ static void fill(uint32_t *from, size_t count, uint32_t value)
 _Noreturn void startup_reset(void)
 {
     board_hold();
+    SCB->VTOR = (uint32_t)&vectors; /* whoever started this may have had its own */
     fill(stack_start, words(stack_start, stack_end) - IN_USE, PAINT);
     fill(bss_start, words(bss_start, bss_end), 0u);
     board_main();

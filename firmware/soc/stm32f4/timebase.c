@@ -1,5 +1,6 @@
 #include "timebase.h"
 
+#include "clock.h"
 #include "regs.h"
 
 #define US_HZ 1000000u
@@ -15,7 +16,7 @@ static void set_up(struct timer *timer, uint32_t timers_Hz, uint32_t last)
 
 void timebase_start(uint32_t timers_Hz)
 {
-    RCC->APB1ENR |= RCC_APB1ENR_TIM5EN;
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_TIM5EN);
     set_up(TIM5, timers_Hz, UINT32_MAX);
     TIM5->CR1 = TIM_CR1_URS | TIM_CR1_CEN;
 }
@@ -27,7 +28,7 @@ uint32_t timebase_us(void)
 
 void timebase_start_ticks(uint32_t timers_Hz, uint32_t period_us)
 {
-    RCC->APB1ENR |= RCC_APB1ENR_TIM3EN;
+    clock_enable(&RCC->APB1ENR, RCC_APB1ENR_TIM3EN);
     set_up(TIM3, timers_Hz, period_us - 1u);
     TIM3->CR2 = TIM_CR2_MMS_UPDATE << TIM_CR2_MMS_POS;
     TIM3->DIER = TIM_DIER_UIE;
@@ -36,7 +37,7 @@ void timebase_start_ticks(uint32_t timers_Hz, uint32_t period_us)
 
 uint32_t timebase_take_tick(void)
 {
-    TIM3->SR = ~TIM_SR_UIF;
+    TIM3->SR = TIM_SR_ALL & ~TIM_SR_UIF;
     return TIM3->CNT;
 }
 
