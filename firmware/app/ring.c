@@ -6,6 +6,11 @@ static uint32_t filled(const struct ring *ring)
            atomic_load_explicit(&ring->read, memory_order_acquire);
 }
 
+bool ring_is_empty(const struct ring *ring)
+{
+    return filled(ring) == 0u;
+}
+
 size_t ring_room(const struct ring *ring)
 {
     return RING_BYTES - filled(ring);

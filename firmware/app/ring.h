@@ -18,6 +18,9 @@ struct ring {
 /* Put all of it in, or nothing: false then. For the writer. */
 bool ring_put(struct ring *ring, const uint8_t *bytes, size_t length);
 
+/* Whether there is nothing in it, for either. */
+bool ring_is_empty(const struct ring *ring);
+
 /* How much could be put in; for the writer. */
 size_t ring_room(const struct ring *ring);
 

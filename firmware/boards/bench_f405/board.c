@@ -63,7 +63,9 @@ static void send(void)
         send_frames();
     } else {
         app_say(&board.app);
-        usart_send(USART1);
+        if (!ring_is_empty(&board.app.sending)) {
+            usart_send(USART1);
+        }
     }
 }
 
@@ -98,10 +100,13 @@ void board_link(void)
 
 void board_serial(void)
 {
-    if (!usart_serve(USART1, &board.app.received, &board.app.sending)) {
+    const struct usart_event event = usart_serve(USART1, &board.app.received, &board.app.sending);
+    if (event.lost) {
         board.app.lost = true;
     }
-    interrupt_pend(LINK_IRQ);
+    if (event.received && event.byte == app_frame_end(&board.app)) { /* what is less than a frame waits for the tick */
+        interrupt_pend(LINK_IRQ);
+    }
 }
 
 void board_can_received(void)
@@ -152,14 +157,6 @@ void board_tick(void)
     }
     send();
     interrupt_pend(LINK_IRQ);
-}
-
-/* The power stage failed, and stopped by itself. */
-void board_break(void)
-{
-    if (amplifier_broken()) {
-        apply(app_fail(&board.app, DCMP_BREAK_INPUT, 0, timebase_us()));
-    }
 }
 
 /* ------------------------------------------------------------------------------------------ errors */
@@ -229,7 +226,6 @@ static void let_interrupts_come(void)
         interrupt_enable(USART1_IRQ, INTERRUPTS_BYTES);
     }
     interrupt_enable(LINK_IRQ, INTERRUPTS_CORE);
-    interrupt_enable(AMPLIFIER_BREAK_IRQ, INTERRUPTS_CORE);
     interrupt_enable(TIMEBASE_TICK_IRQ, INTERRUPTS_CORE);
 }
 

@@ -8,7 +8,6 @@ void board_serial(void);
 void board_can_sent(void);
 void board_can_received(void);
 void board_can_error(void);
-void board_break(void);
 void board_nmi(void);
 
 #endif

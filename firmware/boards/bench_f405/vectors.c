@@ -1,5 +1,4 @@
 /* Where the processor goes. What is missing here leads to HardFault, and so to an end. */
-#include "amplifier.h"
 #include "board.h"
 #include "bxcan.h"
 #include "link_irq.h"
@@ -18,7 +17,6 @@ const struct vectors vectors __attribute__((section(".vectors"), used)) = {
             [BXCAN_TX_IRQ] = board_can_sent,
             [BXCAN_RX0_IRQ] = board_can_received,
             [BXCAN_SCE_IRQ] = board_can_error,
-            [AMPLIFIER_BREAK_IRQ] = board_break,
             [TIMEBASE_TICK_IRQ] = board_tick,
             [USART1_IRQ] = board_serial,
         },

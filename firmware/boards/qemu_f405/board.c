@@ -44,10 +44,13 @@ static void apply(struct dcmp_output output)
 
 void board_serial(void)
 {
-    if (!usart_serve(USART1, &board.app.received, &board.app.sending)) {
+    const struct usart_event event = usart_serve(USART1, &board.app.received, &board.app.sending);
+    if (event.lost) {
         board.app.lost = true;
     }
-    interrupt_pend(LINK_IRQ);
+    if (event.received && event.byte == app_frame_end(&board.app)) {
+        interrupt_pend(LINK_IRQ);
+    }
 }
 
 void board_plant(void)
@@ -175,7 +178,7 @@ static void start(void)
 static void sleep(void)
 {
     interrupts_mask();
-    if (ring_room(&board.plant_said) == RING_BYTES && !board.changed) {
+    if (ring_is_empty(&board.plant_said) && !board.changed) {
         interrupts_wait();
     }
     interrupts_unmask();

@@ -7,8 +7,6 @@
 
 #include "clock.h"
 
-#define AMPLIFIER_BREAK_IRQ 24u
-
 /* How a voltage becomes what is on the pins. */
 struct amplifier_scale {
     int32_t zero_code;     /* DAC: the code that is 0 V, about 2048; PWM: not used */
@@ -27,7 +25,8 @@ void amplifier_off(const struct amplifier_scale *scale);
 /* A voltage; then ENABLE high, if it was not. */
 void amplifier_on(const struct amplifier_scale *scale, int16_t voltage_mV);
 
-/* Whether the power stage reports a failure of its own (boards that have such a line). */
+/* Whether the power stage reports a failure of its own, or did since the last time (boards that have such a line). It has
+ * stopped by itself then; there is no interrupt, which would come again and again while the line is low. */
 bool amplifier_broken(void);
 
 #endif

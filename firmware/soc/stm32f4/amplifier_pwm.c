@@ -35,7 +35,6 @@ void amplifier_start(const struct clock *clock, const struct amplifier_scale *sc
     TIM1->BDTR = TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE; /* no MOE: low until somebody arms */
     TIM1->EGR = TIM_EGR_UG;
     TIM1->SR = 0;
-    TIM1->DIER = TIM_DIER_BIE;
     TIM1->CR1 = TIM_CR1_ARPE | TIM_CR1_CEN;
     pin_set_up(GPIOA, PWM_PIN, PIN_ALTERNATE, PIN_DOWN, TIMER);
 }

@@ -125,7 +125,6 @@ struct timer {
 #define TIM_SMCR_TS_ITR0 0u
 #define TIM_SMCR_TS_ITR2 2u
 #define TIM_DIER_UIE BIT(0)
-#define TIM_DIER_BIE BIT(7)
 #define TIM_SR_ALL 0x1E5Fu /* flags of a general-purpose timer: written 0 to clear one, 1 to leave it */
 #define TIM1_SR_ALL 0x1EFFu
 #define TIM_SR_UIF BIT(0)

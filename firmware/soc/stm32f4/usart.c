@@ -6,13 +6,14 @@ void usart_start(struct usart *port, uint32_t bus_Hz, uint32_t baud)
     port->CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
 }
 
-static bool receive(struct usart *port, uint32_t status, struct ring *received)
+static struct usart_event receive(struct usart *port, uint32_t status, struct ring *received)
 {
-    const uint8_t byte = (uint8_t)(port->DR & 0xFFu); /* takes note of the errors, too */
-    if ((status & USART_SR_RXNE) == 0u) {
-        return (status & USART_SR_ORE) == 0u;
+    struct usart_event event = {false, (uint8_t)(port->DR & 0xFFu), (status & USART_SR_ORE) != 0u};
+    if ((status & USART_SR_RXNE) != 0u) { /* otherwise reading has taken note of the errors, and that was all */
+        event.received = ring_put(received, &event.byte, 1u);
+        event.lost = event.lost || !event.received;
     }
-    return ring_put(received, &byte, 1u) && (status & USART_SR_ORE) == 0u;
+    return event;
 }
 
 static void send(struct usart *port, struct ring *sending)
@@ -25,17 +26,17 @@ static void send(struct usart *port, struct ring *sending)
     }
 }
 
-bool usart_serve(struct usart *port, struct ring *received, struct ring *sending)
+struct usart_event usart_serve(struct usart *port, struct ring *received, struct ring *sending)
 {
     const uint32_t status = port->SR;
-    bool whole = true;
+    struct usart_event event = {false, 0u, false};
     if ((status & (USART_SR_RXNE | USART_SR_ORE | USART_SR_NF | USART_SR_FE)) != 0u) {
-        whole = receive(port, status, received);
+        event = receive(port, status, received);
     }
     if ((status & USART_SR_TXE) != 0u && (port->CR1 & USART_CR1_TXEIE) != 0u) {
         send(port, sending);
     }
-    return whole;
+    return event;
 }
 
 void usart_send(struct usart *port)

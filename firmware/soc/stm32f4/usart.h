@@ -14,8 +14,15 @@
 /* `bus_Hz` is of the bus that it hangs on. Its clock and pins are the board's business. */
 void usart_start(struct usart *port, uint32_t bus_Hz, uint32_t baud);
 
-/* In its interrupt. False if bytes were lost: they came faster than they were read, or there was no room. */
-bool usart_serve(struct usart *port, struct ring *received, struct ring *sending);
+/* What an interrupt brought. */
+struct usart_event {
+    bool received;
+    uint8_t byte;
+    bool lost; /* bytes: they came faster than they were read, or there was no room */
+};
+
+/* In its interrupt. */
+struct usart_event usart_serve(struct usart *port, struct ring *received, struct ring *sending);
 
 /* There is something in `sending`. */
 void usart_send(struct usart *port);

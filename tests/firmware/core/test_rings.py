@@ -35,6 +35,7 @@ def test_ring_keeps_order_and_loses_nothing(core: Core, start: int) -> None:
         number = 0
         for puts, length in moves:
             assert core.lib.ring_room(ring) == ROOM - len(held)
+            assert core.lib.ring_is_empty(ring) is not bool(held)
             if puts:
                 data = bytes((number + i) % 251 for i in range(length))
                 fits = length <= ROOM - len(held)

@@ -1,0 +1,94 @@
+"""The machine as a board of the contract suite's kind: it ticks when a host waits, with the plant on its pins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sim_backend.board_config import board_config
+from sim_backend.pins import Pins
+from tests.target.machine.system import System
+from tools.record import RecordLink, image, record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.values import Truth
+    from tests.target.machine.ports import Frame
+
+_BOARD = 3
+_SAID_US = 600.0  # by then it has said what there is to say of a tick
+_SIGN = 1 << 31
+
+
+class TargetBoard:
+    """A bench board with the plant.
+
+    Parameters
+    ----------
+    elf
+        Its program.
+    rig
+        Whose record it has, and whose plant.
+    carrier
+        `cobs`, `slcan` or `can`.
+    options
+        Of System.
+    """
+
+    def __init__(self, elf: Path, rig: Rig, carrier: str = "cobs", **options: object) -> None:
+        kept = record(board_config(rig, _BOARD), link=RecordLink[carrier])
+        self.system = System(elf, image(kept), **options)  # type: ignore[arg-type]
+        self.pins = Pins(rig)
+        self.carrier = carrier
+        self.period_us = 1e6 * rig.period
+        self.ticks = 0
+        self.turned: Callable[[float], int] | None = None  # the count, where somebody turns the arm by hand
+        self._frames: list[Frame] = []
+        self.system.position = self._at_tick
+        self.system.can.on_sent = self._heard
+
+    def _heard(self, frame: Frame) -> bool:
+        self._frames.append(frame)
+        return True
+
+    def _at_tick(self, now: float) -> int:
+        self.ticks += 1
+        if self.ticks > 1:
+            self.pins.advance(round(self.system.amplifier_mV))
+        count = self.pins.count() if self.turned is None else self.turned(now)
+        return count - 2 * (count & _SIGN)
+
+    def tick(self) -> None:
+        """Let the next tick come, and what follows from it."""
+        before = self.ticks
+        for _ in range(1000):
+            self.system.run_for(50.0)
+            if self.ticks > before:
+                self.system.run_for(_SAID_US)
+                return
+        raise AssertionError(f"no tick: {self.system.misuse} {self.system.faults} {self.system.resets}")
+
+    def receive(self, data: bytes) -> None:
+        """Let bytes come in, at the pace of the line."""
+        self.system.usart.hear(data)
+
+    def receive_frame(self, number: int, data: bytes) -> None:
+        """Let a frame come in."""
+        self.system.can.hear((number, data))
+
+    def transmit(self) -> bytes:
+        """Return the bytes that went out."""
+        sent = bytes(self.system.usart.sent)
+        self.system.usart.sent.clear()
+        return sent
+
+    def transmit_frames(self) -> list[Frame]:
+        """Return the frames that went out."""
+        sent, self._frames = self._frames, []
+        return sent
+
+    def truth(self) -> Truth:
+        """Return the true state at the last tick."""
+        return self.pins.truth

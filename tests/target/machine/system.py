@@ -1,0 +1,334 @@
+"""The machine: memory, time, what is on the pins, and the way in and out for a test."""
+
+from __future__ import annotations
+
+import heapq
+import random
+from typing import TYPE_CHECKING
+
+from elftools.elf.elffile import ELFFile
+from unicorn import (
+    UC_ARCH_ARM,
+    UC_HOOK_BLOCK,
+    UC_HOOK_CODE,
+    UC_HOOK_INTR,
+    UC_HOOK_MEM_WRITE,
+    UC_MODE_MCLASS,
+    UC_MODE_THUMB,
+    Uc,
+    UcError,
+)
+from unicorn import arm_const as arm
+from unicorn.unicorn_const import UC_PROT_ALL
+
+from tests.target.machine.block import Block
+from tests.target.machine.clocks import Flash, Gpio, Iwdg, Rcc
+from tests.target.machine.cpu import HARD_FAULT, RETURN, Cpu
+from tests.target.machine.ports import Can, Dac, Usart
+from tests.target.machine.timers import EncoderTimer, PwmTimer, Timer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+FLASH, RAM, RAM_BYTES = 0x0800_0000, 0x2000_0000, 0x2_0000
+STACK_TOP_OF_BOARD = 0x2000_1000
+_PERIPHERALS, _PRIVATE = 0x4000_0000, 0xE000_0000
+_SECTOR = {1: (0x4000, 0x4000), 2: (0x8000, 0x4000)}
+_WFI = b"\x30\xbf"
+_RETURNS = 8  # unicorn's number for the end of an exception
+_SLICE = 2000  # instructions at most before somebody looks at the time
+_ENABLE, _DIRECTION = 15, 14
+
+
+class Pwr(Block):
+    """The voltage regulator: it is set up, and nothing depends on it here."""
+
+    NAME, CLOCK = "PWR", ("APB1ENR", 28)
+
+
+class System:
+    """A bench board.
+
+    Parameters
+    ----------
+    elf
+        Its program, as it would be flashed.
+    record
+        What is in sectors 1 and 2; blank by default.
+    crystal
+        Whether the crystal swings.
+    lsi_hz
+        Hz, of the watchdog's oscillator: 17 to 47 kHz.
+    preempt
+        Let interrupts come between any two instructions, by this seed. None: where a block of code begins.
+    exact
+        Count every instruction, one by one, instead of taking them from the length of a block.
+    supply_mV, full_scale_mV
+        mV: the motor's supply of a bridge; what 2048 codes of the DAC are behind the outer stage.
+    """
+
+    def __init__(
+        self, elf: Path, record: bytes = b"", *, crystal: bool = True, lsi_hz: float = 32_000.0,
+        preempt: int | None = None, exact: bool = False, supply_mV: float = 10_000.0, full_scale_mV: float = 10_000.0,
+    ) -> None:  # fmt: skip
+        self.lsi_hz, self.supply_mV, self.full_scale_mV = lsi_hz, supply_mV, full_scale_mV
+        self.chance = random.Random(preempt) if preempt is not None else None  # noqa: S311
+        self.exact = exact
+        self.now_us, self.instructions = 0.0, 0
+        self._look, self._leaves, self._held = False, False, False
+        self.misuse: list[str] = []
+        self.faults: list[str] = []
+        self.resets: list[tuple[float, str]] = []
+        self.pins_seen: list[tuple[float, bool, float]] = []
+        self.lowest_stack = STACK_TOP_OF_BOARD
+        self.position: Callable[[float], int] = lambda _: 0
+        self.starved = False
+        self._events: list[tuple[float, int, Callable[[], object]]] = []
+        self._order = 0
+        self._asleep, self._reset_for = False, ""
+        self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
+        self._map(elf, record)
+        self.cpu = Cpu(self.uc, self)
+        self.rcc = Rcc(self, crystal=crystal)
+        self.flash, self.iwdg, self.pwr = Flash(self), Iwdg(self), Pwr(self, "PWR")
+        self.gpio = {letter: Gpio(self, f"GPIO{letter}") for letter in "AB"}
+        self.gpio["B"].outside = 1 << 12  # the bridge's failure line rests high
+        self.timers: dict[str, Timer] = {name: Timer(self, name) for name in ("TIM3", "TIM5")}
+        self.encoder, self.pwm = EncoderTimer(self, "TIM2"), PwmTimer(self)
+        self.timers |= {"TIM2": self.encoder, "TIM1": self.pwm}
+        self.usart, self.dac, self.can = Usart(self), Dac(self), Can(self)
+        self.blocks: dict[int, Block] = {}
+        for block in (
+            self.rcc, self.flash, self.iwdg, self.pwr, *self.gpio.values(), *self.timers.values(), self.usart,
+            self.dac, self.can,
+        ):  # fmt: skip
+            self.blocks[block.base >> 10] = block
+        self.reset("power")
+
+    def _map(self, elf: Path, record: bytes) -> None:
+        uc = self.uc
+        uc.mem_map(FLASH, 1 << 20, UC_PROT_ALL)
+        uc.mem_map(RAM, RAM_BYTES, UC_PROT_ALL)
+        uc.mem_write(FLASH, b"\xff" * (1 << 20))
+        uc.mem_write(RAM, random.Random(1).randbytes(RAM_BYTES))  # noqa: S311 - what power-on leaves
+        with elf.open("rb") as file:
+            for segment in ELFFile(file).iter_segments():
+                if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
+                    uc.mem_write(segment["p_paddr"], segment.data())
+        uc.mem_write(FLASH + 0x4000, record)
+        uc.mmio_map(_PERIPHERALS, 0x8_0000, self._load, None, self._store, None)
+        uc.mmio_map(_PRIVATE, 0x10_0000, self._load_private, None, self._store_private, None)
+        uc.mem_map(RETURN & ~0xFFF, 0x1000, UC_PROT_ALL)
+        uc.mem_write(RETURN & ~0xFFF, b"\x00\xbf" * 0x800)
+        uc.hook_add(UC_HOOK_BLOCK, self._block)
+        if self.exact:
+            uc.hook_add(UC_HOOK_CODE, self._instruction)
+        uc.hook_add(UC_HOOK_INTR, self._trap)
+        uc.hook_add(UC_HOOK_MEM_WRITE, self._program, begin=FLASH, end=FLASH + (1 << 20) - 1)
+
+    # ---------------------------------------------------------------------------------- registers
+
+    def _load(self, _: Uc, offset: int, size: int, __: object) -> int:
+        block = self.blocks.get((_PERIPHERALS + offset) >> 10)
+        if block is None:
+            self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
+            return 0
+        return block.load(_PERIPHERALS + offset - block.base, size) & 0xFFFF_FFFF
+
+    def _store(self, _: Uc, offset: int, size: int, value: int, __: object) -> None:
+        block = self.blocks.get((_PERIPHERALS + offset) >> 10)
+        if block is None:
+            self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
+            return
+        block.store(_PERIPHERALS + offset - block.base, size, value)
+
+    def _load_private(self, _: Uc, offset: int, size: int, __: object) -> int:
+        return self.cpu.load(offset, size)
+
+    def _store_private(self, _: Uc, offset: int, size: int, value: int, __: object) -> None:
+        self.cpu.store(offset, size, value)
+
+    def _program(self, uc: Uc, _: int, address: int, size: int, value: int, __: object) -> None:
+        before = int.from_bytes(uc.mem_read(address, 4), "little")
+        left = self.flash.programmed(address, before, value & 0xFFFF_FFFF, size)
+        self.at_once(lambda: uc.mem_write(address, left.to_bytes(4, "little")))
+
+    def erase(self, sector: int) -> None:
+        """Blank a sector of the flash memory."""
+        start, length = _SECTOR[sector]
+        self.uc.mem_write(FLASH + start, b"\xff" * length)
+
+    # --------------------------------------------------------------------------------------- time
+
+    def after(self, us: float, deed: Callable[[], object]) -> None:
+        """Have something happen later."""
+        self._order += 1
+        heapq.heappush(self._events, (self.now_us + us, self._order, deed))
+
+    def at_once(self, deed: Callable[[], object]) -> None:
+        """Have something happen as soon as this instruction is over."""
+        self.after(0.0, deed)
+        self.interrupt_now()
+
+    def stand_still(self, us: float) -> None:
+        """Let time pass in which the processor does nothing, not even take interrupts."""
+        self.now_us += us
+
+    def interrupt_now(self) -> None:
+        """Let somebody look where the next block of instructions begins; unicorn repeats what is stopped midway."""
+        self._look = True
+
+    def pc(self) -> int:
+        """Return where the processor is."""
+        return int(self.uc.reg_read(arm.UC_ARM_REG_PC))
+
+    def jump(self, address: int) -> None:
+        """Go on there."""
+        self._pc = address | 1
+        self.uc.reg_write(arm.UC_ARM_REG_PC, address | 1)
+
+    def note_stack(self, at: int) -> None:
+        """Remember how deep it was."""
+        self.lowest_stack = min(self.lowest_stack, at)
+
+    def _spend(self, instructions: int) -> None:
+        self.instructions += instructions
+        self.now_us += 1e6 * instructions / self._core_Hz
+
+    def _block(self, uc: Uc, _: int, size: int, __: object) -> None:
+        if not self.exact:
+            self._spend(max(size // 3, 1))  # bytes: instructions take two or four
+        if self._held and not uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1:
+            self._look = True  # what was masked comes now
+        if self._look or (self._events and self._events[0][0] <= self.now_us):
+            self._look = False
+            uc.emu_stop()
+
+    def _instruction(self, _: Uc, __: int, ___: int, ____: object) -> None:
+        self._spend(1)
+
+    def _trap(self, uc: Uc, number: int, _: object) -> None:
+        if number == _RETURNS:
+            self._leaves = True
+        else:
+            self.faults.append(f"trap {number} at {self.pc():#x}")
+            self.cpu.pending.add(HARD_FAULT)
+        uc.emu_stop()
+
+    def run_until(self, us: float) -> None:
+        """Let the board work until then."""
+        while self.now_us < us:
+            self._happen()
+            if self._reset_for:
+                self._restart()
+            entered = self.cpu.may_enter()
+            self._held = entered is None and self.cpu.next() is not None
+            if entered is not None:
+                self._asleep = False
+                self.cpu.enter(entered)
+            elif self._held:
+                self._asleep = False
+            if self._asleep or (self.starved and not self.cpu.active):
+                self._sleep(us)
+            else:
+                self._execute(us)
+
+    def run_for(self, us: float) -> None:
+        """Let the board work for so long."""
+        self.run_until(self.now_us + us)
+
+    def _sleep(self, us: float) -> None:
+        following = self._events[0][0] if self._events else us
+        self.now_us = max(self.now_us, min(us, following, self.iwdg.due_us()))
+
+    def _happen(self) -> None:
+        if self.now_us >= self.iwdg.due_us():
+            self.ask_for_reset("watchdog")
+        while self._events and self._events[0][0] <= self.now_us:
+            heapq.heappop(self._events)[2]()
+
+    def _execute(self, us: float) -> None:
+        self._core_Hz = self.rcc.core_Hz()
+        count = self.chance.randint(1, 400) if self.chance else 0
+        begin = self.instructions
+        try:
+            self.uc.emu_start(self._pc, RETURN, count=count)
+        except UcError as error:
+            self.faults.append(f"{error} at {self.pc():#x}")
+            self.cpu.pending.add(HARD_FAULT)
+        if self.instructions == begin:
+            self._spend(1)
+        pc = self.pc()
+        self.note_stack(int(self.uc.reg_read(arm.UC_ARM_REG_SP)))
+        self._pc = pc | 1
+        self._asleep = FLASH < pc < FLASH + (1 << 20) and self.uc.mem_read((pc & ~1) - 2, 2) == _WFI
+        if self._leaves or pc & ~1 == RETURN:
+            self._leaves = False
+            self.cpu.leave()
+
+    # -------------------------------------------------------------------------------------- resets
+
+    def ask_for_reset(self, cause: str) -> None:
+        """Have the chip start again, as soon as this instruction is over."""
+        self._reset_for = cause
+        self.interrupt_now()
+
+    def _restart(self) -> None:
+        cause, self._reset_for = self._reset_for, ""
+        self.reset(cause)
+
+    def reset(self, cause: str) -> None:
+        """Start again: power, pin, software, watchdog. Memory stays as it is."""
+        self.resets.append((self.now_us, cause))
+        self._events.clear()
+        self._asleep = False
+        for block in self.blocks.values():
+            if block is not self.rcc:
+                block.reset()
+        self.rcc.reset_for(cause)
+        self.cpu.reset()
+        self.cpu.vtor = FLASH
+        self.uc.reg_write(arm.UC_ARM_REG_PRIMASK, 0)
+        stack, start = (int.from_bytes(self.uc.mem_read(FLASH + at, 4), "little") for at in (0, 4))
+        self.uc.reg_write(arm.UC_ARM_REG_SP, stack)
+        self._pc = start
+        self._core_Hz = self.rcc.core_Hz()
+        self.look_at_pins()
+
+    # ---------------------------------------------------------------------------------------- pins
+
+    def trigger(self, name: str) -> None:
+        """Let the trigger output of a timer reach the others."""
+        if name == "TIM3":
+            self.encoder.turn(self.position(self.now_us))
+        for timer in self.timers.values():
+            if timer.name != name and timer.is_clocked():
+                timer.triggered_by(name)
+
+    @property
+    def enable(self) -> bool:
+        """The level of ENABLE; its resistor pulls it down."""
+        return self.gpio["B"].level(_ENABLE)
+
+    @property
+    def stage_mV(self) -> float:  # noqa: N802
+        """What the stage before the gate puts out: full negative where nobody drives the DAC's pin."""
+        if self.pwm.is_clocked():
+            sign = -1.0 if self.gpio["B"].level(_DIRECTION) else 1.0
+            led = self.gpio["A"].function(8) == 1
+            return sign * self.pwm.duty() * self.supply_mV * led
+        code = self.dac.code()
+        return -self.full_scale_mV if code is None else (code - 2048) * self.full_scale_mV / 2048
+
+    @property
+    def amplifier_mV(self) -> float:  # noqa: N802
+        """What reaches the motor."""
+        return self.stage_mV if self.enable else 0.0
+
+    def look_at_pins(self) -> None:
+        """Note a change of what reaches the motor."""
+        now = (self.enable, self.amplifier_mV)
+        if not self.pins_seen or self.pins_seen[-1][1:] != now:
+            self.pins_seen.append((self.now_us, *now))
