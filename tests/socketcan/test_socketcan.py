@@ -33,7 +33,7 @@ BOTH = pytest.mark.parametrize("kind", ["slcan", "vcan"])
 def test_shipped_rig_runs_at_1_khz_over_the_kernels_own_slcan(tmp_path: Path) -> None:
     figures = tmp_path / "figures.json"
     with Bench(tmp_path, "slcan", rate_hz=1000) as bench:
-        host = bench.start("--duration", "1.5", "--json", str(figures))
+        host = bench.start("--duration", "2", "--json", str(figures))
         assert host.wait() == 0, host.printed()
         output = bench.device.output
     assert (output.voltage_mV, output.enable, output.state, output.owner) == (0, 0, State.IDLE, 0)

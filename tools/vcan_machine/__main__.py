@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tools.vcan_machine.machine import missing, run
+from tools.vcan_machine.machine import CONSOLE, missing, run
 
 
 def main() -> int:
@@ -24,7 +24,7 @@ def main() -> int:
         except RuntimeError as error:
             sys.stderr.write(f"{error}\n")
             return 1
-        sys.stdout.write((Path(share) / "console.txt").read_text(errors="replace"))
+        sys.stdout.write((Path(share) / CONSOLE).read_text(errors="replace"))
     return code
 
 

@@ -17,6 +17,10 @@ _LIST_S, _FETCH_S, _UNPACK_S = 120, 300, 120
 _XZ = b"\xfd7zXZ\0"
 
 
+class UnavailableError(RuntimeError):
+    """The kernel cannot be had here."""
+
+
 class Unpacked(NamedTuple):
     """What a machine is made of."""
 
@@ -35,7 +39,7 @@ def unpack(folder: Path) -> Unpacked:
 
     Raises
     ------
-    RuntimeError
+    UnavailableError
         If this is no Debian, or its archive cannot be reached.
     """
     lists, cache, root = (folder / name for name in ("lists", "cache", "root"))
@@ -46,7 +50,7 @@ def unpack(folder: Path) -> Unpacked:
     shown = _call(["apt-cache", *ours, "show", "--no-all-versions", META_PACKAGE], folder, _LIST_S)
     found = re.search(r"^Depends:.*?\b(linux-image-\d\S*)", shown, re.MULTILINE)
     if found is None:
-        raise RuntimeError(f"{META_PACKAGE} names no kernel in this system's archive. Use Debian.")
+        raise UnavailableError(f"{META_PACKAGE} names no kernel in this system's archive. Use Debian.")
     _call(["apt-get", *ours, "download", "-qq", found[1], _BUSYBOX], folder, _FETCH_S)
     for package in sorted(folder.glob("*.deb")):
         _call(["dpkg-deb", "-x", str(package), str(root)], folder, _UNPACK_S)
@@ -96,10 +100,12 @@ def _call(command: list[str], folder: Path, seconds: int) -> str:
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise RuntimeError(
+        raise UnavailableError(
             f"{command[0]} cannot be run ({error}). The kernel is Debian's: use Debian."
         ) from error
     if done.returncode:
         said = " ".join(done.stderr.split())
-        raise RuntimeError(f"{' '.join(command)}: {said}. Look at the network and /etc/apt, then try again.")
+        raise UnavailableError(
+            f"{' '.join(command)}: {said}. Look at the network and /etc/apt, then try again."
+        )
     return done.stdout

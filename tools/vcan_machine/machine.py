@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 QEMU = "qemu-system-x86_64"
 INSTALL = "apt install --no-install-recommends qemu-system-x86 iproute2"
+CONSOLE = "console.txt"  # in the shared folder: what was printed
 _SECONDS = 300  # wall: nothing may take longer
 _GRACE_S = 5
 _LAST = 2000  # characters of the console that an error shows
@@ -52,21 +53,30 @@ def machine() -> Machine:
 
     Raises
     ------
-    RuntimeError
+    UnavailableError
         If it cannot be fetched.
     """
+    made = place()
+    if not made.initramfs.exists():
+        _make(made)
+    return made
+
+
+def place() -> Machine:
+    """Return where the machine is, or will be."""
     key = hashlib.sha256(repr((INIT, MODULES)).encode()).hexdigest()[:16]
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "dcmp-hil"
-    made = Machine(base / f"machine-{key}" / "vmlinux", base / f"machine-{key}" / "initramfs")
-    if made.initramfs.exists():
-        return made
-    base.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=base) as temporary:
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    folder = cache / "dcmp-hil" / f"machine-{key}"
+    return Machine(folder / "vmlinux", folder / "initramfs")
+
+
+def _make(made: Machine) -> None:
+    folder = made.kernel.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
         parts = unpack(Path(temporary))
-        made.kernel.parent.mkdir(exist_ok=True)
         _write(made.kernel, parts.kernel)
         _write(made.initramfs, initramfs(parts.busybox, in_order(MODULES, parts.modules)))
-    return made
 
 
 def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[str, str]) -> int:
@@ -77,7 +87,7 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
     command
         Of this computer, whose files are there under the same names.
     share
-        A folder that the machine sees as /mnt, and may write to; `console.txt` in it is what was printed.
+        A folder that the machine sees as /mnt, and may write to; CONSOLE is in it.
     folder
         Where the command is run.
     settings
@@ -85,6 +95,8 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
 
     Raises
     ------
+    UnavailableError
+        If its kernel cannot be fetched.
     RuntimeError
         If the machine did not come to its end in time.
     """
@@ -94,22 +106,27 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
     script = f"cd {shlex.quote(str(folder))} || exit\n{exports}exec {shlex.join(command)}\n"
     (share / SCRIPT).write_text(script)
     (share / STATUS).unlink(missing_ok=True)
-    console = share / "console.txt"
-    with console.open("wb") as output:
-        # `timeout` stays when this process is killed, and ends the machine.
-        subprocess.run(  # noqa: S603 - our own
-            ["timeout", f"--kill-after={_GRACE_S}", str(_SECONDS), *_qemu(made, share)],  # noqa: S607 - of coreutils
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            timeout=_SECONDS + 2 * _GRACE_S,
-            check=False,
-        )
+    _start(_qemu(made, share), share / CONSOLE)
     try:
         return int((share / STATUS).read_text())
     except (OSError, ValueError):
-        last = console.read_text(errors="replace")[-_LAST:]
+        last = (share / CONSOLE).read_text(errors="replace")[-_LAST:]
         raise RuntimeError(f"The machine ended before its command did. Its console: {last}") from None
+
+
+def _start(qemu: list[str], console: Path) -> None:
+    """Start the machine and wait for its end; if this process is killed meanwhile, `timeout` ends it."""
+    bounded = ["timeout", f"--kill-after={_GRACE_S}", str(_SECONDS), *qemu]
+    with (
+        console.open("wb") as output,
+        subprocess.Popen(  # noqa: S603 - our own
+            bounded, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+        ) as process,
+    ):
+        try:
+            process.wait()
+        finally:
+            process.terminate()
 
 
 def _qemu(made: Machine, share: Path) -> list[str]:
