@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from pathlib import Path
 
-BOUND_S = 60.0
+BOUND_S = 20.0
 
 
 class Host:
