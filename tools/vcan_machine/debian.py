@@ -56,7 +56,7 @@ def unpack(folder: Path) -> Unpacked:
         _call(["dpkg-deb", "-x", str(package), str(root)], folder, _UNPACK_S)
     return Unpacked(
         _without_wrapper(next(root.glob("boot/vmlinuz-*")).read_bytes()),
-        {path.stem.replace("-", "_"): path for path in root.rglob("*.ko")},
+        {_name(path): path for path in root.rglob("*.ko*")},
         next(path for path in root.glob("**/bin/busybox")).read_bytes(),
     )
 
@@ -70,22 +70,35 @@ def _without_wrapper(image: bytes) -> bytes:
     return kernel if kernel.startswith(b"\x7fELF") else image
 
 
-def in_order(names: Sequence[str], modules: dict[str, Path]) -> list[Path]:
-    """Return modules with those that they need, each after what it needs; those built in are left out."""
-    ordered: dict[str, Path] = {}
+def in_order(names: Sequence[str], modules: dict[str, Path]) -> dict[str, bytes]:
+    """Return modules with those that they need, each after what it needs; those built in are left out.
+
+    Parameters
+    ----------
+    names
+        Of those that are wanted.
+    modules
+        All there are, by name with underscores; compressed or not.
+    """
+    ordered: dict[str, bytes] = {}
 
     def add(name: str) -> None:
-        file = modules.get(name.replace("-", "_"))
-        if file is None or file.stem in ordered:
+        file = modules.get(name)
+        if file is None or name in ordered:
             return
-        needs = re.search(rb"\0depends=([^\0]*)\0", file.read_bytes())
+        module = lzma.decompress(file.read_bytes()) if file.suffix == ".xz" else file.read_bytes()
+        needs = re.search(rb"\0depends=([^\0]*)\0", module)
         for other in filter(None, needs[1].decode().split(",") if needs else ()):
-            add(other)
-        ordered[file.stem] = file
+            add(other.replace("-", "_"))
+        ordered[name] = module
 
     for name in names:
         add(name)
-    return list(ordered.values())
+    return ordered
+
+
+def _name(module: Path) -> str:
+    return module.name.partition(".")[0].replace("-", "_")
 
 
 def _call(command: list[str], folder: Path, seconds: int) -> str:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    from collections.abc import Mapping
 
-MODULES = ("virtio_mmio", "9pnet_virtio", "9p", "overlay", "can-raw", "vcan", "slcan")
+MODULES = ("virtio_mmio", "9pnet_virtio", "9p", "overlay", "can_raw", "vcan", "slcan")
 HOST, SHARE = "host", "share"  # tags of the two shared folders
 SCRIPT, STATUS = "run.sh", "status"  # in the shared folder
 
@@ -38,7 +37,7 @@ _FOLDERS = ("bin", "dev", "modules", "host", "written", "new")
 _FOLDER, _PROGRAM, _FILE = 0o40755, 0o100755, 0o100644
 
 
-def initramfs(busybox: bytes, modules: Sequence[Path]) -> bytes:
+def initramfs(busybox: bytes, modules: Mapping[str, bytes]) -> bytes:
     """Return it as the kernel wants it, an archive in cpio's format `newc`.
 
     Parameters
@@ -46,16 +45,16 @@ def initramfs(busybox: bytes, modules: Sequence[Path]) -> bytes:
     busybox
         Linked statically.
     modules
-        In the order in which they are loaded.
+        By name, in the order in which they are loaded.
     """
-    names = "".join(f"{module.name}\n" for module in modules)
+    names = "".join(f"{name}\n" for name in modules)
     return b"".join(
         (
             *(_entry(name, _FOLDER) for name in _FOLDERS),
             _entry("init", _PROGRAM, INIT.encode()),
             _entry("bin/busybox", _PROGRAM, busybox),
             _entry("modules/order", _FILE, names.encode()),
-            *(_entry(f"modules/{module.name}", _FILE, module.read_bytes()) for module in modules),
+            *(_entry(f"modules/{name}", _FILE, module) for name, module in modules.items()),
             _entry("TRAILER!!!", 0),
         )
     )
