@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import can
 import serial
 
+from dcmp_hil.backends import socketcan
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.failures import reason
 from dcmp_hil.backends.serial_link import path_of
@@ -36,6 +37,7 @@ FAILURES = (
 _NETWORKED = ("socketcand", "udp_multicast")
 _WAITING = ("robotell", "seeedstudio", "serial")  # they write without a bound: a frozen device would hold us
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
+_MOST_FOREIGN = 64  # frames that are passed over in one look; a bus full of errors is no reason to stay
 _LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
 
 
@@ -93,6 +95,8 @@ class CanLink:
         try:
             poll = select.poll()
             poll.register(bus.fileno(), select.POLLIN)
+            if self._settings.interface == "socketcan":
+                self._check_up(bus)
         except (NotImplementedError, *FAILURES):
             return  # it is looked at instead
         except BaseException:
@@ -149,7 +153,10 @@ class CanLink:
         """Return a frame that is there; remote and extended ones are not ours."""
         bus = self._opened()
         try:
-            while (message := bus.recv(0.0)) is not None:
+            for _ in range(_MOST_FOREIGN):
+                message = bus.recv(0.0)
+                if message is None:
+                    return None
                 if message.is_error_frame:
                     self._check_bus(message)
                 elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
@@ -157,6 +164,15 @@ class CanLink:
         except FAILURES as error:
             raise self._broken(error) from error
         return None
+
+    def _check_up(self, bus: can.BusABC) -> None:
+        """Look once: an interface that is down can be opened, and fails at the first look only."""
+        try:
+            bus.recv(0.0)
+        except can.CanError as error:
+            if socketcan.is_down(error):
+                raise socketcan.was_down(self._settings) from error
+            raise self._broken(error) from error
 
     def _check_bus(self, message: can.Message) -> None:
         if message.arbitration_id & _BUS_OFF:
@@ -171,6 +187,8 @@ class CanLink:
         return self._bus
 
     def _broken(self, error: BaseException) -> LinkError:
+        if socketcan.is_down(error):
+            return socketcan.went_down(self._settings)
         return LinkError(
             f"{self.name}: the connection broke ({reason(error)}). The device goes to 0 V by itself. Look at "
             "adapter, cable and bus, then start again."
@@ -183,6 +201,8 @@ def _open_bus(settings: CanSettings, *, listen_only: bool) -> can.BusABC:
     try:
         if interface == "slcan":
             return SlcanBus(path_of(str(channel)), settings.baud, settings.bitrate, listen_only=listen_only)
+        if interface == "socketcan":
+            socketcan.check_there(settings)
         return can.Bus(
             channel=channel,
             interface=interface,

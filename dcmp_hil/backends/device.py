@@ -128,7 +128,8 @@ class DeviceBackend:
         except BackendError as unconfirmed:
             if error is None:
                 raise
-            error.add_note(str(unconfirmed))
+            if str(unconfirmed) != str(error):  # a link that broke says so again
+                error.add_note(str(unconfirmed))
         finally:
             self._link.close()
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
+from dcmp_hil.cli.onlookers import dashboard, status_line
 from dcmp_hil.cli.run_folder import RunFolder
-from dcmp_hil.cli.status import StatusLine
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
-    from dcmp_hil.telemetry.rerun_sink import Viewer
-    from dcmp_hil.telemetry.rig_view import RigView
 
 _FAULTS = "sim_backend.faults:with_faults"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
@@ -92,24 +89,14 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
     """Everybody who looks on: the status line, and Rerun if there is a viewer or a recording."""
-    makers: list[SinkMaker] = [partial(_status_line, rig.period)]
+    makers: list[SinkMaker] = [partial(status_line, rig.period)]
     record = options.record or (folder.recording if folder else None)
     viewer = _viewer(options)
     if record is not None or viewer != "none":
         from dcmp_hil.telemetry.rig_view import view_of
 
-        makers.append(partial(_dashboard, view_of(rig), record, viewer))
+        makers.append(partial(dashboard, view_of(rig), record, viewer))
     return makers
-
-
-def _status_line(period: float) -> Sink:
-    return StatusLine(console.err, period)
-
-
-def _dashboard(view: RigView, record: Path | None, viewer: Viewer) -> Sink:
-    from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second, in the telemetry process
-
-    return RerunSink(rig=view, record=record, viewer=viewer)
 
 
 def _viewer(options: Options) -> Literal["spawn", "connect", "none"]:

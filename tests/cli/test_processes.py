@@ -1,6 +1,7 @@
 """Real processes: signals, and what stays behind."""
 
 import json
+import pickle
 import signal
 import subprocess
 import sys
@@ -8,6 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
+
+from dcmp_hil.cli.onlookers import dashboard, status_line
 
 _BOUND = 60.0  # s: generous, these machines are shared
 
@@ -83,6 +86,17 @@ def test_help_imports_nothing_heavy() -> None:
         "print([m for m in ('numpy', 'rerun', 'pydantic', 'scipy', 'matplotlib', 'can') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_telemetry_process_does_not_import_what_the_run_does() -> None:
+    code = (
+        "import pickle, sys, dcmp_hil.telemetry.child\n"
+        "pickle.loads(bytes.fromhex(sys.argv[1]))\n"
+        "print([m for m in ('rerun', 'pydantic', 'scipy', 'matplotlib', 'can') if m in sys.modules])"
+    )
+    sent = pickle.dumps([status_line, dashboard]).hex()
+    done = subprocess.run([sys.executable, "-c", code, sent], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
 
 
