@@ -30,9 +30,9 @@ const struct record *record_newest(const struct record *const sectors[RECORD_SEC
 {
     const struct record *newest = 0;
     for (uint32_t sector = 0; sector < RECORD_SECTORS; sector++) {
-        for (uint32_t i = 0; i < count; i++) {
-            const struct record *record = &sectors[sector][i];
-            if (is_whole(record) && (newest == 0 || record->sequence > newest->sequence)) {
+        for (uint32_t i = count; i > 0u; i--) { /* the newest come first then, and few checksums are taken */
+            const struct record *record = &sectors[sector][i - 1u];
+            if ((newest == 0 || record->sequence > newest->sequence) && is_whole(record)) {
                 newest = record;
             }
         }

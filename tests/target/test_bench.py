@@ -1,4 +1,4 @@
-"""Rung D: the bench board's own program, unmodified, on the machine; its host is the real backend in virtual time."""
+"""Rung D: the bench board's own program, unmodified, on the machine; its host is the real backend."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ WATCHDOG_US, IWDG_US, FAST_US, TICK_US = 20_000.0, 50_000.0, 2_000.0, 1_000.0
 TICK_IRQ, LINK_IRQ, BREAK_PIN = 29, 6, 12
 CYCLES_A_MS = 168_000
 CONFIG = {
-    "counts_per_rev": 4096, "period_us": 1000, "voltage_limit_mV": 10_000, "slew_mV_per_ms": 0, "watchdog_ms": 20,
-    "speed_limit_counts_s": 32_768, "travel_limit_counts": 16_384, "node": 0,
+    "counts_per_rev": 4096, "period_us": 1000, "voltage_limit_mV": 10_000, "slew_mV_per_ms": 0,
+    "watchdog_ms": 20, "speed_limit_counts_s": 32_768, "travel_limit_counts": 16_384, "node": 0,
 }  # fmt: skip
 
 
@@ -85,9 +85,9 @@ def never_on(system: System, since_us: float) -> bool:
 
 def said_of(system: System, parameter: Parameter) -> int:
     """Ask a board that boots over its serial line."""
-    from dcmp_hil.wire import cobs  # noqa: PLC0415
-    from dcmp_hil.wire.codec import pack, unpack  # noqa: PLC0415
-    from dcmp_hil.wire.messages import ParameterGet, ParameterValue  # noqa: PLC0415
+    from dcmp_hil.wire import cobs
+    from dcmp_hil.wire.codec import pack, unpack
+    from dcmp_hil.wire.messages import ParameterGet, ParameterValue
 
     receiver = cobs.Receiver()
     system.usart.sent.clear()
@@ -99,9 +99,9 @@ def said_of(system: System, parameter: Parameter) -> int:
 
 def state_of(system: System) -> State:
     """Read the state that a booted board's newest sample shows."""
-    from dcmp_hil.wire import cobs  # noqa: PLC0415
-    from dcmp_hil.wire.codec import unpack  # noqa: PLC0415
-    from dcmp_hil.wire.messages import SampleReport  # noqa: PLC0415
+    from dcmp_hil.wire import cobs
+    from dcmp_hil.wire.codec import unpack
+    from dcmp_hil.wire.messages import SampleReport
 
     system.usart.sent.clear()
     system.run_for(3000.0)
@@ -161,8 +161,8 @@ def test_tick_costs_a_tenth_of_a_millisecond_at_most(
         longest = max(target.system.cpu.counts[16 + TICK_IRQ])
         everything = (target.system.instructions - before) / ticks
     figure(
-        f"rung D over {carrier}: {handlers:.0f} instructions a period in interrupts ({longest} in the longest tick), "
-        f"{everything:.0f} in all, of {CYCLES_A_MS} cycles"
+        f"rung D over {carrier}: {handlers:.0f} instructions a period in interrupts "
+        f"({longest} in the longest tick), {everything:.0f} in all, of {CYCLES_A_MS} cycles"
     )
     assert everything < 0.1 * CYCLES_A_MS
 
@@ -204,7 +204,7 @@ def test_silence_is_0_V_after_the_watchdog_and_a_tick(f405: Path, carrier: str) 
 @pytest.mark.parametrize("lsi_hz", [17_000.0, 32_000.0, 47_000.0])
 @pytest.mark.parametrize("stuck", ["tick", "link", "main"])
 def test_stuck_task_is_reset_by_the_chips_own_watchdog(f405: Path, stuck: str, lsi_hz: float) -> None:
-    """T08 and IWDG: whoever stops working, the motor is off within 50 ms and the board comes back disarmed."""
+    """T08 and IWDG: whoever stops working, the motor is off within 50 ms, the board comes back disarmed."""
     with rung(f405, lsi_hz=lsi_hz) as target:
         target.drive(20)
         began = target.system.now_us
@@ -246,7 +246,12 @@ def test_frames_that_nobody_acknowledges_are_given_up(f405: Path) -> None:
         target.system.can.on_sent = lambda _: False
         target.system.run_for(30_000.0)
         heard: list[bytes] = []
-        target.system.can.on_sent = lambda frame: heard.append(frame[1]) is None
+
+        def hear(frame: tuple[int, bytes]) -> bool:
+            heard.append(frame[1])
+            return True
+
+        target.system.can.on_sent = hear
         target.system.run_for(1_500.0)
         newest = target.board.ticks - 1
         samples = [data for data in heard if len(data) == 8]

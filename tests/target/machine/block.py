@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 class Block:
     """Registers by name; what the firmware reads and writes goes through here.
 
-    A subclass gives `read_NAME()` and `write_NAME(value, before)` for registers that do something; `write_NAME` returns what
-    the register holds then.
+    A subclass gives `read_NAME()` and `write_NAME(value, before)` for registers that do something; the latter
+    returns what the register holds then.
     """
 
     NAME = ""
@@ -79,7 +79,7 @@ class Block:
         if register is None:
             self.misuse(f"nothing at offset {offset:#x}")
             return None
-        if size != 4:  # noqa: PLR2004 - bytes
+        if size != 4:
             self.misuse(f"{register.name} in {size} bytes")
         return register.name
 

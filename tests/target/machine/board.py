@@ -1,4 +1,4 @@
-"""The machine as a board of the contract suite's kind: it ticks when a host waits, with the plant on its pins."""
+"""The machine as a board that ticks when a host waits, with the plant on its pins."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Rcc(Block):
         source = HSE_HZ if self.flag("PLLCFGR", 22) else HSI_HZ
         entry = source / max(self.field("PLLCFGR", 0, 6), 1)
         vco = entry * self.field("PLLCFGR", 6, 9)
-        if not 0.95e6 <= entry <= 2.1e6 or not 100e6 <= vco <= 432e6:  # noqa: PLR2004 - RM0090
+        if not 0.95e6 <= entry <= 2.1e6 or not 100e6 <= vco <= 432e6:
             self.misuse(f"PLL: {entry / 1e6:g} MHz in, {vco / 1e6:g} MHz inside")
         return vco / (2 * self.field("PLLCFGR", 16, 2) + 2)
 
@@ -57,18 +57,18 @@ class Rcc(Block):
 
     def timer_Hz(self, bus: int) -> float:  # noqa: N802
         """Return the clock of that bus's timers."""
-        divided = self.field("CFGR", 10 if bus == 1 else 13, 3) >= 4  # noqa: PLR2004
+        divided = self.field("CFGR", 10 if bus == 1 else 13, 3) >= 4
         return self.bus_Hz(bus) * (2 if divided else 1)
 
     def write_CR(self, value: int, before: int) -> int:  # noqa: N802
         """Start and stop oscillators."""
         started = value & ~before
         if started >> 16 & 1 and self.crystal:
-            self.system.after(_HSE_US, lambda: self.flag("CR", 16) and self.raise_flag("CR", 17))
+            self.system.after(_HSE_US, lambda: self.raise_flag("CR", 17) if self.flag("CR", 16) else None)
         if started >> 24 & 1:
             if self.flag("PLLCFGR", 22) and not before >> 17 & 1:
                 self.misuse("the PLL starts on a crystal that is not ready")
-            self.system.after(_PLL_US, lambda: self.flag("CR", 24) and self.raise_flag("CR", 25))
+            self.system.after(_PLL_US, lambda: self.raise_flag("CR", 25) if self.flag("CR", 24) else None)
         ready = before & 0x0202_0002
         for bit in (16, 24):
             if not value >> bit & 1:
@@ -112,6 +112,13 @@ class Rcc(Block):
             self.system.cpu.pend(2)
 
 
+class Pwr(Block):
+    """The voltage regulator: it is set up, and nothing depends on it here."""
+
+    NAME = "PWR"
+    CLOCK: tuple[str, int] | None = ("APB1ENR", 28)
+
+
 class Flash(Block):
     """The interface to the flash memory."""
 
@@ -131,10 +138,10 @@ class Flash(Block):
 
     def write_KEYR(self, value: int, _: int) -> int:  # noqa: N802
         """Unlock, key by key."""
-        if self._keys >= 2 or value != self.KEYS[self._keys]:  # noqa: PLR2004
+        if self._keys >= 2 or value != self.KEYS[self._keys]:
             self.misuse("a wrong key: locked until the next reset")
         self._keys += 1
-        if self._keys == 2:  # noqa: PLR2004
+        if self._keys == 2:
             self.drop_flag("CR", 31)
         return 0
 
@@ -161,7 +168,7 @@ class Flash(Block):
 
     def programmed(self, address: int, before: int, value: int, size: int) -> int:
         """Return what a write to the memory itself leaves there."""
-        if not self.flag("CR", 0) or self.flag("CR", 31) or self.field("CR", 8, 2) != 2 or size != 4:  # noqa: PLR2004
+        if not self.flag("CR", 0) or self.flag("CR", 31) or self.field("CR", 8, 2) != 2 or size != 4:
             self.misuse(f"flash at {address:#x} is written without PG, or by the wrong size")
             self.raise_flag("SR", 7)
             return before
@@ -195,13 +202,13 @@ class Iwdg(Block):
 
     def write_KR(self, value: int, _: int) -> int:  # noqa: N802
         """Start, feed, open."""
-        if value == 0xCCCC:  # noqa: PLR2004
+        if value == 0xCCCC:
             self.running = True
-        self._open = value == 0x5555  # noqa: PLR2004
+        self._open = value == 0x5555
         if value in (0xAAAA, 0xCCCC):
             self._fed_us = self.system.now_us
             self.feeds += 1
-        elif value != 0x5555:  # noqa: PLR2004
+        elif value != 0x5555:
             self.misuse(f"key {value:#x}")
         return 0
 
@@ -236,8 +243,8 @@ class Gpio(Block):
 
     def function(self, pin: int) -> int:
         """Return the alternate function that is on a pin, -1 for none."""
-        register = "AFRL" if pin < 8 else "AFRH"  # noqa: PLR2004
-        return self.field(register, 4 * (pin % 8), 4) if self.mode(pin) == 2 else -1  # noqa: PLR2004
+        register = "AFRL" if pin < 8 else "AFRH"
+        return self.field(register, 4 * (pin % 8), 4) if self.mode(pin) == 2 else -1
 
     def level(self, pin: int, *, undriven: bool = False) -> bool:
         """Return what an output drives; what the board's resistor says of a pin that is none."""

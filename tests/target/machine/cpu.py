@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from unicorn import arm_const as arm
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from unicorn import Uc
 
     from tests.target.machine.system import System
 
@@ -27,7 +25,7 @@ NMI, HARD_FAULT = 2, 3
 class Cpu:
     """Registers through unicorn, exceptions by hand."""
 
-    def __init__(self, uc: Uc, system: System) -> None:
+    def __init__(self, uc: Any, system: System) -> None:
         self.uc, self.system = uc, system
         self.reset()
 
@@ -65,7 +63,7 @@ class Cpu:
 
     def next(self) -> int | None:
         """Return the exception that would come now, whatever PRIMASK says."""
-        ready = [n for n in self.pending if n < 16 or n - 16 in self.enabled]  # noqa: PLR2004
+        ready = [n for n in self.pending if n < 16 or n - 16 in self.enabled]
         if not ready:
             return None
         first = min(ready, key=lambda n: (self._level(n), n))
@@ -127,33 +125,40 @@ class Cpu:
 
     # ---------------------------------------------------------------------- its own registers
 
-    def load(self, offset: int, size: int) -> int:
+    def load(self, offset: int) -> int:
         """Let the firmware read what is at 0xE0000000 and above."""
-        if offset == 0xED08:  # noqa: PLR2004 - VTOR
+        if offset == 0xED08:
             return self.vtor
-        if offset == 0xED0C:  # noqa: PLR2004 - AIRCR
+        if offset == 0xED0C:
             return 0xFA05_0000
         return 0
 
     def store(self, offset: int, size: int, value: int) -> None:
         """Let the firmware write there."""
-        if 0xE100 <= offset < 0xE120:  # noqa: PLR2004
-            self.enabled |= self._numbers(offset - 0xE100, value)
-        elif 0xE180 <= offset < 0xE1A0:  # noqa: PLR2004
-            self.enabled -= self._numbers(offset - 0xE180, value)
-        elif 0xE200 <= offset < 0xE220:  # noqa: PLR2004
-            for irq in self._numbers(offset - 0xE200, value) - self.masked:
-                self.pend(16 + irq)
-        elif 0xE400 <= offset < 0xE4F0:  # noqa: PLR2004
-            for byte in range(size):
-                self.priority[16 + offset - 0xE400 + byte] = value >> (8 * byte) & 0xF0
-        elif offset == 0xED08:  # noqa: PLR2004
+        if 0xE100 <= offset < 0xE500:
+            self._store_nvic(offset - 0xE100, size, value)
+        elif offset == 0xED08:
             self.vtor = value
-        elif offset == 0xED0C and value >> 16 == 0x05FA and value & 4:  # noqa: PLR2004
+        elif offset == 0xED0C and value >> 16 == 0x05FA and value & 4:
             self.system.ask_for_reset("software")
         else:
             self.system.misuse.append(f"the processor's own register {offset:#x} is written")
         self.system.interrupt_now()
+
+    def _store_nvic(self, offset: int, size: int, value: int) -> None:
+        register, within = offset & ~0x7F, offset & 0x7F
+        if register == 0x000:
+            self.enabled |= self._numbers(within, value)
+        elif register == 0x080:
+            self.enabled -= self._numbers(within, value)
+        elif register == 0x100:
+            for irq in self._numbers(within, value) - self.masked:
+                self.pend(16 + irq)
+        elif offset >= 0x300:
+            for byte in range(size):
+                self.priority[16 + offset - 0x300 + byte] = value >> (8 * byte) & 0xF0
+        else:
+            self.system.misuse.append(f"the interrupt controller's register {offset:#x} is written")
 
     @staticmethod
     def _numbers(offset: int, value: int) -> set[int]:

@@ -18,7 +18,9 @@ Frame = tuple[int, bytes]
 class Usart(Block):
     """USART 1 at the rate that its registers say; the world talks at its own."""
 
-    NAME, CLOCK, IRQ = "USART1", ("APB2ENR", 4), 37
+    NAME = "USART1"
+    CLOCK: tuple[str, int] | None = ("APB2ENR", 4)
+    IRQ = 37
 
     def __init__(self, system: System) -> None:
         self.baud = 1e6  # the world's
@@ -38,7 +40,7 @@ class Usart(Block):
         return 10e6 / rate
 
     def _is_well_paced(self) -> bool:
-        return abs(self._byte_us() * self.baud / 10e6 - 1) < 0.02  # noqa: PLR2004 - what a UART stands
+        return abs(self._byte_us() * self.baud / 10e6 - 1) < 0.02
 
     def hear(self, data: bytes) -> None:
         """Let bytes come in, one behind the other."""
@@ -50,7 +52,7 @@ class Usart(Block):
     def _arrive(self) -> None:
         byte = self._coming.popleft()
         pins = self.system.gpio["A"]
-        on = self.flag("CR1", 13) and self.flag("CR1", 2) and pins.function(10) == 7 and self.is_clocked()  # noqa: PLR2004
+        on = self.flag("CR1", 13) and self.flag("CR1", 2) and pins.function(10) == 7 and self.is_clocked()
         if on:
             if self.flag("SR", 5):
                 self.raise_flag("SR", 3)  # overrun: the one before was not read
@@ -80,7 +82,7 @@ class Usart(Block):
         """Send a byte."""
         if not self.flag("SR", 7):
             self.misuse("DR is written before TXE")
-        if self.system.gpio["A"].function(9) == 7 and self.flag("CR1", 13) and self.flag("CR1", 3):  # noqa: PLR2004
+        if self.system.gpio["A"].function(9) == 7 and self.flag("CR1", 13) and self.flag("CR1", 3):
             self.drop_flag("SR", 7)
             self.system.after(self._byte_us(), lambda: self._gone(value))
         return 0
@@ -102,11 +104,12 @@ class Usart(Block):
 class Dac(Block):
     """Channel 1."""
 
-    NAME, CLOCK = "DAC", ("APB1ENR", 29)
+    NAME = "DAC"
+    CLOCK: tuple[str, int] | None = ("APB1ENR", 29)
 
     def code(self) -> int | None:
         """Return what is on PA4; None where nothing is."""
-        on = self.flag("CR", 0) and self.is_clocked() and self.system.gpio["A"].mode(4) == 3  # noqa: PLR2004
+        on = self.flag("CR", 0) and self.is_clocked() and self.system.gpio["A"].mode(4) == 3
         return self.now["DHR12R1"] if on else None
 
     def write_DHR12R1(self, value: int, _: int) -> int:  # noqa: N802
@@ -118,7 +121,7 @@ class Dac(Block):
     def write_CR(self, value: int, _: int) -> int:  # noqa: N802
         """Switch on."""
         self.now["CR"] = value
-        if value & 1 and self.system.gpio["A"].mode(4) != 3:  # noqa: PLR2004
+        if value & 1 and self.system.gpio["A"].mode(4) != 3:
             self.misuse("it is switched on while PA4 is not analog")
         self.system.look_at_pins()
         return value
@@ -127,7 +130,8 @@ class Dac(Block):
 class Can(Block):
     """bxCAN: initialisation, filters by lists, three mailboxes, a FIFO of three, error states."""
 
-    NAME, CLOCK = "CAN1", ("APB1ENR", 25)
+    NAME = "CAN1"
+    CLOCK: tuple[str, int] | None = ("APB1ENR", 25)
     TX, RX0, SCE = 19, 20, 22
 
     def __init__(self, system: System) -> None:
@@ -164,10 +168,10 @@ class Can(Block):
             return before
         quanta = 3 + (value >> 16 & 0xF) + (value >> 20 & 7)
         rate = self.system.rcc.bus_Hz(1) / ((value & 0x3FF) + 1) / quanta
-        if abs(rate / 1e6 - 1) > 0.001:  # noqa: PLR2004
+        if abs(rate / 1e6 - 1) > 0.001:
             self.misuse(f"{rate:.0f} bit/s")
         sampled = (2 + (value >> 16 & 0xF)) / quanta
-        if not 0.7 <= sampled <= 0.9:  # noqa: PLR2004
+        if not 0.7 <= sampled <= 0.9:
             self.misuse(f"sampled at {sampled:.0%}")
         return value
 
@@ -194,7 +198,7 @@ class Can(Block):
             if not self.flag("FMR", 0) and (bank is None or self.flag("FA1R", bank)):
                 self.misuse(f"{name} is written while the filters are in use")
         super().store(offset, size, value)
-        if len(name) == 4 and name[:2] == "TI" and value & 1:  # noqa: PLR2004 - TI0R
+        if len(name) == 4 and name[:2] == "TI" and value & 1:
             self._request(int(name[2]))
 
     # ------------------------------------------------------------------------------- transmission
@@ -220,7 +224,7 @@ class Can(Block):
             return
         data = self.now[f"TDL{box}R"].to_bytes(4, "little") + self.now[f"TDH{box}R"].to_bytes(4, "little")
         frame = (self.now[f"TI{box}R"] >> 21, data[: self.now[f"TDT{box}R"] & 0xF])
-        led = self.system.gpio["B"].function(9) == 9 and self.system.gpio["B"].function(8) == 9  # noqa: PLR2004
+        led = self.system.gpio["B"].function(9) == 9 and self.system.gpio["B"].function(8) == 9
         if led and self.on_sent(frame):
             self._empty(box, well=True)
         self._next()
@@ -248,7 +252,7 @@ class Can(Block):
         """Let a frame come in."""
         if self.now["MSR"] & 3 or self.flag("ESR", 2) or not self.is_clocked() or not self._passes(frame[0]):
             return
-        if len(self._fifo) == 3:  # noqa: PLR2004
+        if len(self._fifo) == 3:
             self.raise_flag("RF0R", 4)
             return
         self._fifo.append(frame)

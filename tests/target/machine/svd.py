@@ -1,4 +1,4 @@
-"""What the vendor says of the registers: offsets, reset values, which bits exist. Read from pyocd's wheel, kept nowhere."""
+"""What the vendor says of the registers: offsets, reset values, bits that exist. Read from pyocd's wheel."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def description() -> dict[str, tuple[int, dict[int, Register]]]:
     found = {}
     for name, element in elements.items():
         described = elements.get(element.get("derivedFrom", ""), element)
-        registers = {}
+        registers: dict[int, Register] = {}
         for register in described.iter("register"):
             label = register.findtext("name", "")
             reset = _F405.get((name, label), int(register.findtext("resetValue", "0"), 16))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import heapq
 import random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from elftools.elf.elffile import ELFFile
+import unicorn
 from unicorn import (
     UC_ARCH_ARM,
     UC_HOOK_BLOCK,
@@ -15,36 +15,28 @@ from unicorn import (
     UC_HOOK_MEM_WRITE,
     UC_MODE_MCLASS,
     UC_MODE_THUMB,
-    Uc,
-    UcError,
 )
 from unicorn import arm_const as arm
-from unicorn.unicorn_const import UC_PROT_ALL
 
-from tests.target.machine.block import Block
-from tests.target.machine.clocks import Flash, Gpio, Iwdg, Rcc
+from tests.target.machine.clocks import Flash, Gpio, Iwdg, Pwr, Rcc
 from tests.target.machine.cpu import HARD_FAULT, RETURN, Cpu
+from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out
 from tests.target.machine.ports import Can, Dac, Usart
+from tests.target.machine.stage import Stage
 from tests.target.machine.timers import EncoderTimer, PwmTimer, Timer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-FLASH, RAM, RAM_BYTES = 0x0800_0000, 0x2000_0000, 0x2_0000
+    from tests.target.machine.block import Block
+
+_EMULATOR: Any = unicorn  # its functions have no types
 STACK_TOP_OF_BOARD = 0x2000_1000
 _PERIPHERALS, _PRIVATE = 0x4000_0000, 0xE000_0000
-_SECTOR = {1: (0x4000, 0x4000), 2: (0x8000, 0x4000)}
 _WFI = b"\x30\xbf"
 _RETURNS = 8  # unicorn's number for the end of an exception
 _SLICE = 2000  # instructions at most before somebody looks at the time
-_ENABLE, _DIRECTION = 15, 14
-
-
-class Pwr(Block):
-    """The voltage regulator: it is set up, and nothing depends on it here."""
-
-    NAME, CLOCK = "PWR", ("APB1ENR", 28)
 
 
 class System:
@@ -70,10 +62,12 @@ class System:
 
     def __init__(
         self, elf: Path, record: bytes = b"", *, crystal: bool = True, lsi_hz: float = 32_000.0,
-        preempt: int | None = None, exact: bool = False, supply_mV: float = 10_000.0, full_scale_mV: float = 10_000.0,
+        preempt: int | None = None, exact: bool = False, supply_mV: float = 10_000.0,
+        full_scale_mV: float = 10_000.0,
     ) -> None:  # fmt: skip
-        self.lsi_hz, self.supply_mV, self.full_scale_mV = lsi_hz, supply_mV, full_scale_mV
-        self.chance = random.Random(preempt) if preempt is not None else None  # noqa: S311
+        self.lsi_hz = lsi_hz
+        self.stage = Stage(self, supply_mV=supply_mV, full_scale_mV=full_scale_mV)
+        self.chance = random.Random(preempt) if preempt is not None else None
         self.exact = exact
         self.now_us, self.instructions = 0.0, 0
         self._look, self._leaves, self._held = False, False, False
@@ -87,12 +81,12 @@ class System:
         self._events: list[tuple[float, int, Callable[[], object]]] = []
         self._order = 0
         self._asleep, self._reset_for = False, ""
-        self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.uc: Any = _EMULATOR.Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self.uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
         self._map(elf, record)
         self.cpu = Cpu(self.uc, self)
         self.rcc = Rcc(self, crystal=crystal)
-        self.flash, self.iwdg, self.pwr = Flash(self), Iwdg(self), Pwr(self, "PWR")
+        self.flash, self.iwdg, self.pwr = Flash(self), Iwdg(self), Pwr(self)
         self.gpio = {letter: Gpio(self, f"GPIO{letter}") for letter in "AB"}
         self.gpio["B"].outside = 1 << 12  # the bridge's failure line rests high
         self.timers: dict[str, Timer] = {name: Timer(self, name) for name in ("TIM3", "TIM5")}
@@ -109,56 +103,45 @@ class System:
 
     def _map(self, elf: Path, record: bytes) -> None:
         uc = self.uc
-        uc.mem_map(FLASH, 1 << 20, UC_PROT_ALL)
-        uc.mem_map(RAM, RAM_BYTES, UC_PROT_ALL)
-        uc.mem_write(FLASH, b"\xff" * (1 << 20))
-        uc.mem_write(RAM, random.Random(1).randbytes(RAM_BYTES))  # noqa: S311 - what power-on leaves
-        with elf.open("rb") as file:
-            for segment in ELFFile(file).iter_segments():
-                if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
-                    uc.mem_write(segment["p_paddr"], segment.data())
-        uc.mem_write(FLASH + 0x4000, record)
-        uc.mmio_map(_PERIPHERALS, 0x8_0000, self._load, None, self._store, None)
+        lay_out(uc, elf, record)
+        uc.mmio_map(_PERIPHERALS, 0x8_0000, self.load, None, self.store, None)
         uc.mmio_map(_PRIVATE, 0x10_0000, self._load_private, None, self._store_private, None)
-        uc.mem_map(RETURN & ~0xFFF, 0x1000, UC_PROT_ALL)
-        uc.mem_write(RETURN & ~0xFFF, b"\x00\xbf" * 0x800)
         uc.hook_add(UC_HOOK_BLOCK, self._block)
         if self.exact:
             uc.hook_add(UC_HOOK_CODE, self._instruction)
         uc.hook_add(UC_HOOK_INTR, self._trap)
-        uc.hook_add(UC_HOOK_MEM_WRITE, self._program, begin=FLASH, end=FLASH + (1 << 20) - 1)
+        uc.hook_add(UC_HOOK_MEM_WRITE, self._program, begin=FLASH, end=FLASH + FLASH_BYTES - 1)
 
     # ---------------------------------------------------------------------------------- registers
 
-    def _load(self, _: Uc, offset: int, size: int, __: object) -> int:
+    def load(self, _: Any, offset: int, size: int, __: object) -> int:
         block = self.blocks.get((_PERIPHERALS + offset) >> 10)
         if block is None:
             self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
             return 0
         return block.load(_PERIPHERALS + offset - block.base, size) & 0xFFFF_FFFF
 
-    def _store(self, _: Uc, offset: int, size: int, value: int, __: object) -> None:
+    def store(self, _: Any, offset: int, size: int, value: int, __: object) -> None:
         block = self.blocks.get((_PERIPHERALS + offset) >> 10)
         if block is None:
             self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
             return
         block.store(_PERIPHERALS + offset - block.base, size, value)
 
-    def _load_private(self, _: Uc, offset: int, size: int, __: object) -> int:
-        return self.cpu.load(offset, size)
+    def _load_private(self, _: Any, offset: int, __: int, ___: object) -> int:
+        return self.cpu.load(offset)
 
-    def _store_private(self, _: Uc, offset: int, size: int, value: int, __: object) -> None:
+    def _store_private(self, _: Any, offset: int, size: int, value: int, __: object) -> None:
         self.cpu.store(offset, size, value)
 
-    def _program(self, uc: Uc, _: int, address: int, size: int, value: int, __: object) -> None:
+    def _program(self, uc: Any, _: int, address: int, size: int, value: int, __: object) -> None:
         before = int.from_bytes(uc.mem_read(address, 4), "little")
         left = self.flash.programmed(address, before, value & 0xFFFF_FFFF, size)
         self.at_once(lambda: uc.mem_write(address, left.to_bytes(4, "little")))
 
     def erase(self, sector: int) -> None:
         """Blank a sector of the flash memory."""
-        start, length = _SECTOR[sector]
-        self.uc.mem_write(FLASH + start, b"\xff" * length)
+        blank(self.uc, sector)
 
     # --------------------------------------------------------------------------------------- time
 
@@ -177,7 +160,7 @@ class System:
         self.now_us += us
 
     def interrupt_now(self) -> None:
-        """Let somebody look where the next block of instructions begins; unicorn repeats what is stopped midway."""
+        """Let somebody look where the next block begins; unicorn repeats what is stopped midway."""
         self._look = True
 
     def pc(self) -> int:
@@ -197,7 +180,7 @@ class System:
         self.instructions += instructions
         self.now_us += 1e6 * instructions / self._core_Hz
 
-    def _block(self, uc: Uc, _: int, size: int, __: object) -> None:
+    def _block(self, uc: Any, _: int, size: int, __: object) -> None:
         if not self.exact:
             self._spend(max(size // 3, 1))  # bytes: instructions take two or four
         if self._held and not uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1:
@@ -206,10 +189,10 @@ class System:
             self._look = False
             uc.emu_stop()
 
-    def _instruction(self, _: Uc, __: int, ___: int, ____: object) -> None:
+    def _instruction(self, _: Any, __: int, ___: int, ____: object) -> None:
         self._spend(1)
 
-    def _trap(self, uc: Uc, number: int, _: object) -> None:
+    def _trap(self, uc: Any, number: int, _: object) -> None:
         if number == _RETURNS:
             self._leaves = True
         else:
@@ -233,7 +216,7 @@ class System:
             if self._asleep or (self.starved and not self.cpu.active):
                 self._sleep(us)
             else:
-                self._execute(us)
+                self._execute()
 
     def run_for(self, us: float) -> None:
         """Let the board work for so long."""
@@ -249,13 +232,13 @@ class System:
         while self._events and self._events[0][0] <= self.now_us:
             heapq.heappop(self._events)[2]()
 
-    def _execute(self, us: float) -> None:
+    def _execute(self) -> None:
         self._core_Hz = self.rcc.core_Hz()
         count = self.chance.randint(1, 400) if self.chance else 0
         begin = self.instructions
         try:
             self.uc.emu_start(self._pc, RETURN, count=count)
-        except UcError as error:
+        except _EMULATOR.UcError as error:
             self.faults.append(f"{error} at {self.pc():#x}")
             self.cpu.pending.add(HARD_FAULT)
         if self.instructions == begin:
@@ -263,7 +246,7 @@ class System:
         pc = self.pc()
         self.note_stack(int(self.uc.reg_read(arm.UC_ARM_REG_SP)))
         self._pc = pc | 1
-        self._asleep = FLASH < pc < FLASH + (1 << 20) and self.uc.mem_read((pc & ~1) - 2, 2) == _WFI
+        self._asleep = FLASH < pc < FLASH + FLASH_BYTES and self.uc.mem_read((pc & ~1) - 2, 2) == _WFI
         if self._leaves or pc & ~1 == RETURN:
             self._leaves = False
             self.cpu.leave()
@@ -310,22 +293,12 @@ class System:
     @property
     def enable(self) -> bool:
         """The level of ENABLE; its resistor pulls it down."""
-        return self.gpio["B"].level(_ENABLE)
+        return self.stage.enable
 
     @property
-    def stage_mV(self) -> float:  # noqa: N802
-        """What the stage before the gate puts out: full negative where nobody drives the DAC's pin."""
-        if self.pwm.is_clocked():
-            sign = -1.0 if self.gpio["B"].level(_DIRECTION) else 1.0
-            led = self.gpio["A"].function(8) == 1
-            return sign * self.pwm.duty() * self.supply_mV * led
-        code = self.dac.code()
-        return -self.full_scale_mV if code is None else (code - 2048) * self.full_scale_mV / 2048
-
-    @property
-    def amplifier_mV(self) -> float:  # noqa: N802
+    def amplifier_mV(self) -> float:
         """What reaches the motor."""
-        return self.stage_mV if self.enable else 0.0
+        return self.stage.amplifier_mV
 
     def look_at_pins(self) -> None:
         """Note a change of what reaches the motor."""

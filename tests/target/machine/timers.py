@@ -1,4 +1,4 @@
-"""The timers as this board may use them: sample clock, microseconds, encoder with captures, PWM with its break."""
+"""The timers as this board may use them: sample clock, microseconds, encoder, PWM with its break."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ if TYPE_CHECKING:
     from tests.target.machine.system import System
 
 _WORD = 0xFFFF_FFFF
-_FLAGS = 0x1EFF
+_IRQ = {"TIM3": 29, "TIM5": 50, "TIM2": 28}
+_WIDE = ("TIM2", "TIM5")
 TRGO_OF = {("TIM2", 2): "TIM3", ("TIM5", 0): "TIM2", ("TIM2", 0): "TIM1", ("TIM5", 1): "TIM3"}
 """Which timer's trigger output is behind an internal trigger input (RM0090, tables of ITRx)."""
 
 
 class Timer(Block):
     """A timer that counts its clock."""
-
-    IRQ = {"TIM3": 29, "TIM5": 50, "TIM2": 28}
-    WIDE = ("TIM2", "TIM5")
 
     def __init__(self, system: System, name: str) -> None:
         bits = {"TIM2": 0, "TIM3": 1, "TIM5": 3}
@@ -30,7 +28,7 @@ class Timer(Block):
     def reset(self) -> None:
         """Stand still."""
         super().reset()
-        self.now["ARR"] = _WORD if self.name in self.WIDE else 0xFFFF
+        self.now["ARR"] = _WORD if self.name in _WIDE else 0xFFFF
         self._prescaler = 0  # in use; PSC comes in at an update
         self._since_us, self._from = 0.0, 0
         self._round = 0
@@ -49,17 +47,17 @@ class Timer(Block):
     def _restart(self, count: int) -> None:
         self._since_us, self._from = self.system.now_us, count
         self._round += 1
-        if self.flag("CR1", 0) and self.now["ARR"] < 0xFFFF_FFFF:  # noqa: PLR2004 - that one never comes round
+        if self.flag("CR1", 0) and self.now["ARR"] < 0xFFFF_FFFF:
             this = self._round
             left = (self.now["ARR"] + 1 - count) * self.period_us()
-            self.system.after(left, lambda: this == self._round and self._update())
+            self.system.after(left, lambda: self._update() if this == self._round else None)
 
     def _update(self) -> None:
         self._prescaler = self.now["PSC"]
         self.raise_flag("SR", 0)
-        if self.flag("DIER", 0) and self.name in self.IRQ:
-            self.system.cpu.line(self.IRQ[self.name], self.is_pending)
-        if self.field("CR2", 4, 3) == 2:  # noqa: PLR2004 - update
+        if self.flag("DIER", 0) and self.name in _IRQ:
+            self.system.cpu.line(_IRQ[self.name], self.is_pending)
+        if self.field("CR2", 4, 3) == 2:
             self.system.trigger(self.name)
         self._restart(0)
 
@@ -103,7 +101,7 @@ class Timer(Block):
         if self.flag("SR", channel):
             self.raise_flag("SR", 8 + channel)
         self.raise_flag("SR", channel)
-        if channel == 1 and self.field("CR2", 4, 3) == 3:  # noqa: PLR2004 - compare pulse
+        if channel == 1 and self.field("CR2", 4, 3) == 3:
             self.system.trigger(self.name)
 
     def source(self, channel: int) -> int:
@@ -117,7 +115,7 @@ class Timer(Block):
         """Capture on the trigger of another timer."""
         if TRGO_OF.get((self.name, self.field("SMCR", 4, 3))) == other:
             for channel in range(1, 5):
-                if self.source(channel) == 3:  # noqa: PLR2004
+                if self.source(channel) == 3:
                     self.capture(channel, self.count())
 
     def read_CCR1(self) -> int:  # noqa: N802
@@ -154,7 +152,7 @@ class EncoderTimer(Timer):
             return
         if not (
             led and inputs and self.field("SMCR", 0, 3) == 3 and self.flag("CR1", 0) and self.is_clocked()
-        ):  # noqa: PLR2004
+        ):
             return
         step = 1 if to > before else -1
         (self.raise_flag if step < 0 else self.drop_flag)("CR1", 4)
@@ -177,7 +175,7 @@ class PwmTimer(Timer):
     def duty(self) -> float:
         """Return the part of the time that PA8 is high."""
         mode = self.field("CCMR1_Output", 4, 3)
-        driven = self.flag("BDTR", 15) and self.flag("CCER", 0) and self.flag("CR1", 0) and mode == 6  # noqa: PLR2004
+        driven = self.flag("BDTR", 15) and self.flag("CCER", 0) and self.flag("CR1", 0) and mode == 6
         return min(self.now["CCR1"] / (self.now["ARR"] + 1), 1.0) if driven else 0.0
 
     def _broken(self) -> bool:
