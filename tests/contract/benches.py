@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.backends import open_backend
 from dcmp_hil.backends.device import DeviceBackend
@@ -101,10 +101,13 @@ def on_bench(kind: str, *overrides: str, **of_board: int) -> Iterator[Bench]:
         first = SimBoardBackend(rig, SimulatedClock(), board)  # type: ignore[arg-type]
         yield Bench(rig, lambda: first, first.board, carrier=carrier)
     else:
-        yield from _pumped(kind, overrides, of_board)
+        with pumped(kind, overrides, lambda rig, carrier: Board(rig, carrier=carrier, **of_board)) as there:
+            yield there
 
 
-def _pumped(kind: str, overrides: tuple[str, ...], of_board: dict[str, int]) -> Iterator[Bench]:
+@contextmanager
+def pumped(kind: str, overrides: tuple[str, ...], make: Callable[[Rig, str], Any]) -> Iterator[Bench]:
+    """Set up a bench whose board is behind a port of the system; `make` makes the board."""
     carrier = kind.split(maxsplit=1)[0]
     way: tuple[str, ...]
     if carrier == "can":
@@ -117,7 +120,7 @@ def _pumped(kind: str, overrides: tuple[str, ...], of_board: dict[str, int]) -> 
         slcan = ("backend.kind=can", "backend.interface=slcan", f"backend.channel={port.path}")
         way = serial if carrier == "cobs" else slcan
     rig = bench(*way, *overrides)
-    pump = Pump(Board(rig, carrier=carrier, **of_board), port)
+    pump = Pump(make(rig, carrier), port)
     pump.start()
     try:
         yield Bench(rig, lambda: open_backend(rig, PatientClock()), pump.board, pump, carrier)

@@ -89,6 +89,11 @@ class TargetBoard:
         sent, self._frames = self._frames, []
         return sent
 
+    @property
+    def enable(self) -> bool:
+        """Whether the amplifier is switched on."""
+        return self.system.enable
+
     def truth(self) -> Truth:
         """Return the true state at the last tick."""
         return self.pins.truth

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import random
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from unicorn import (
 )
 from unicorn import arm_const as arm
 
+from tests.target.machine.agenda import Agenda
 from tests.target.machine.clocks import Flash, Gpio, Iwdg, Pwr, Rcc
 from tests.target.machine.cpu import HARD_FAULT, RETURN, Cpu
 from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out
@@ -78,8 +78,7 @@ class System:
         self.lowest_stack = STACK_TOP_OF_BOARD
         self.position: Callable[[float], int] = lambda _: 0
         self.starved = False
-        self._events: list[tuple[float, int, Callable[[], object]]] = []
-        self._order = 0
+        self._agenda = Agenda()
         self._asleep, self._reset_for = False, ""
         self.uc: Any = _EMULATOR.Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self.uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
@@ -147,8 +146,7 @@ class System:
 
     def after(self, us: float, deed: Callable[[], object]) -> None:
         """Have something happen later."""
-        self._order += 1
-        heapq.heappush(self._events, (self.now_us + us, self._order, deed))
+        self._agenda.add(self.now_us + us, deed)
 
     def at_once(self, deed: Callable[[], object]) -> None:
         """Have something happen as soon as this instruction is over."""
@@ -185,7 +183,7 @@ class System:
             self._spend(max(size // 3, 1))  # bytes: instructions take two or four
         if self._held and not uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1:
             self._look = True  # what was masked comes now
-        if self._look or (self._events and self._events[0][0] <= self.now_us):
+        if self._look or self._agenda.next_us <= self.now_us:
             self._look = False
             uc.emu_stop()
 
@@ -223,14 +221,13 @@ class System:
         self.run_until(self.now_us + us)
 
     def _sleep(self, us: float) -> None:
-        following = self._events[0][0] if self._events else us
-        self.now_us = max(self.now_us, min(us, following, self.iwdg.due_us()))
+        self.now_us = max(self.now_us, min(us, self._agenda.next_us, self.iwdg.due_us()))
 
     def _happen(self) -> None:
         if self.now_us >= self.iwdg.due_us():
             self.ask_for_reset("watchdog")
-        while self._events and self._events[0][0] <= self.now_us:
-            heapq.heappop(self._events)[2]()
+        while self._agenda.next_us <= self.now_us:
+            self._agenda.take()()
 
     def _execute(self) -> None:
         self._core_Hz = self.rcc.core_Hz()
@@ -265,7 +262,7 @@ class System:
     def reset(self, cause: str) -> None:
         """Start again: power, pin, software, watchdog. Memory stays as it is."""
         self.resets.append((self.now_us, cause))
-        self._events.clear()
+        self._agenda = Agenda()
         self._asleep = False
         for block in self.blocks.values():
             if block is not self.rcc:
