@@ -6,12 +6,18 @@ from collections.abc import Callable, Iterator
 import pytest
 
 FIGURE = "figure"
+_LONG = ("tests/stateful/", "tests/socketcan/", "tests/target/", "tests/firmware/test_")  # minutes, alone
 
 
 @pytest.fixture
 def figure(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
     """Give a way to have a line printed at the end: a size, a count, what CI's output is to keep track of."""
     return lambda line: record_property(FIGURE, line)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest: begun last, it would leave the other workers without work."""
+    items.sort(key=lambda item: not item.nodeid.startswith(_LONG))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
