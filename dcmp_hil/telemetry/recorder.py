@@ -55,7 +55,7 @@ class Recorder:
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self._apart = apart
-        self._ring = apart.ring if apart else Ring(_CAPACITY)
+        self._ring = apart.ring if apart else Ring(_IN_LINE if in_line else _CAPACITY)
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now
