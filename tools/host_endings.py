@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 """Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
+_WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 _AT_S = 1.2  # s, device time at which a host's own part raises
 
 _PART = f'''
@@ -40,7 +41,8 @@ class _Raises:
 
     def _look(self, t):
         if t >= {_AT_S}:
-            Path("deed").write_text(str(time.monotonic_ns()))
+            waited = Path("/proc/self/schedstat").read_text().split()[1]
+            Path("deed").write_text(f"{{time.monotonic_ns()}} {{waited}}")
             if self._what is None:
                 return "no voltage"
             raise self._what("on purpose")
@@ -100,14 +102,20 @@ class Ending(NamedTuple):
     kept: list[str]  # files in the run's folder that have something in them
     said: str  # the last line on stderr
     doubt_us: int  # by which off_us may be less
+    waited_us: int  # of off_us: ready to run, and its computer ran something else
     tries: int
+
+    @property
+    def own_us(self) -> int:
+        """What its own doing took, at least."""
+        return self.off_us - self.doubt_us - self.waited_us
 
     @property
     def wrong(self) -> list[str]:
         """What is not as it must be."""
         code = WAYS[self.way].code
         return [
-            *([f"0 V after {1e-3 * self.off_us:.1f} ms"] if self.off_us - self.doubt_us > OFF_US else []),
+            *([f"0 V after {1e-3 * self.own_us:.1f} ms"] if self.own_us > OFF_US else []),
             *([f"gone after {self.gone_s:.1f} s"] if self.gone_s > GONE_S else []),
             *([f"code {self.exit_code}: {self.said}"] if self.exit_code != code else []),
             *([f"{self.state} with {self.fault}"] if (self.state, self.fault) != ("IDLE", "NONE") else []),
@@ -139,6 +147,7 @@ def end(name: str) -> Ending:
 
 def _start(port: str, way: Way, folder: Path) -> subprocess.Popen[bytes]:
     sets = [word for override in way.overrides for word in ("--set", override)]
+    sets += ["--set", f"backend.watchdog_ms={_WATCHDOG_MS}"]
     length = "30" if way.number == signal.SIGINT else "0"  # the shorter one leaves a picture, too
     return start_host(port, "--duration", length, *sets, folder=folder)
 
@@ -147,12 +156,13 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
     """End it and look; None if it ended by itself before."""
     clock, way, deed = MonotonicClock(), WAYS[name], folder / "deed"
     if way.number is not None:
-        deed.write_text(str(clock.now_ns()))
+        deed.write_text(f"{clock.now_ns()} {_waited_ns(host)}")
         host.send_signal(way.number)
     wait(lambda: not device.output.enable, "the amplifier is off")
     if not deed.exists():
         return None
-    at_ns = int(deed.read_text())
+    waited_ns = _waited_ns(host)
+    at_ns, before_ns = map(int, deed.read_text().split())
     deed_us, doubt_us = device.clock_us(at_ns)
     off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
     off_us = next(o.since_us for o in device.log if o.since_us > off.since_us and not o.voltage_mV)
@@ -169,19 +179,25 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
         kept=sorted(file.name for file in files),
         said=said[-1] if said else "",
         doubt_us=doubt_us,
+        waited_us=(waited_ns - before_ns) // 1000,
         tries=1,
     )
 
 
+def _waited_ns(host: subprocess.Popen[bytes]) -> int:
+    """Return how long a host's loop has been ready to run and was not let, in all."""
+    return int(Path(f"/proc/{host.pid}/schedstat").read_text().split()[1])
+
+
 _HEAD = (
-    "| ended by | n | 0 V after, ms: median | max | gone after, s: max | code | device | wrong "
-    "| started again |"
+    "| ended by | n | 0 V after, ms: median | max | gone after, s: max | kept from running, ms: max | code "
+    "| device | wrong | started again |"
 )
 
 
 def median_us(endings: list[Ending], way: str) -> float:
     """Return how long it usually was to 0 V, us; 0 if there is none."""
-    return statistics.median([e.off_us - e.doubt_us for e in endings if e.way == way] or [0])
+    return statistics.median([e.own_us for e in endings if e.way == way] or [0])
 
 
 def table(endings: list[Ending]) -> str:
@@ -195,6 +211,7 @@ def table(endings: list[Ending]) -> str:
         cells = (
             name, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}",
             f"{max(ending.gone_s for ending in these):.1f}",
+            f"{max(1e-3 * ending.waited_us for ending in these):.1f}",
             ", ".join(sorted({str(ending.exit_code) for ending in these})),
             ", ".join(sorted({f"{ending.state} {ending.fault}" for ending in these})),
             sum(bool(ending.wrong) for ending in these), sum(ending.tries - 1 for ending in these),
@@ -202,7 +219,7 @@ def table(endings: list[Ending]) -> str:
         rows.append(f"| {' | '.join(map(str, cells))} |")
     bounds = (
         f"bounds, by the firmware's clock: 0 V after {1e-3 * OFF_US:g} ms, the median after "
-        f"{1e-3 * USUAL_US:g} ms; gone after {GONE_S:g} s"
+        f"{1e-3 * USUAL_US:g} ms, less what the host was kept from running; gone after {GONE_S:g} s"
     )
     return "\n".join([*rows, "", bounds])
 

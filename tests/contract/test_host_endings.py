@@ -7,7 +7,7 @@ import pytest
 from tests.firmware.core_library import compiler
 from tools.host_endings import Ending, end, median_us, table
 
-GOOD = Ending("SIGTERM", 1_500, 0.5, 143, "IDLE", "NONE", ["run.rrd", "summary.json"], "", 50, 1)
+GOOD = Ending("SIGTERM", 1_500, 0.5, 143, "IDLE", "NONE", ["run.rrd", "summary.json"], "", 50, 100, 1)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def test_host_that_ends_leaves_zero_volts_and_everything_it_saw(way: str) -> Non
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"off_us": 50_051}, "0 V after 50.1 ms"),
+        ({"off_us": 50_151}, "0 V after 50.0 ms"),
         ({"gone_s": 2.1}, "gone after 2.1 s"),
         ({"exit_code": 0, "said": "bye"}, "code 0: bye"),
         ({"state": "FAULT", "fault": "HOST_SILENT"}, "FAULT with HOST_SILENT"),
@@ -36,4 +36,4 @@ def test_table_of_endings_counts_what_is_wrong(changed: dict[str, object], said:
     assert GOOD.wrong == []
     assert wrong.wrong == [said]
     assert "| 1 | 0 |" in table([GOOD, wrong])
-    assert median_us([GOOD], "SIGTERM") == 1_450
+    assert median_us([GOOD], "SIGTERM") == 1_350
