@@ -8,7 +8,7 @@ from dcmp_hil.wire.frame import Frame
 
 _LONGEST = 31  # bytes of a line without its CR
 _LINE = re.compile(rb"t([0-7][0-9A-F]{2})([1-8])((?:[0-9A-F]{2})+)")
-_ANSWER = re.compile(rb"[zZ\x07]*(?:V[0-9A-F]{4}|N[0-9A-Z]{4}|F[0-9A-F]{2})?")
+_ANSWER = re.compile(rb"\x07*(?:[zZ]|V[0-9A-F]{4}|N[0-9A-Z]{4}|F[0-9A-F]{2})?")
 _BYTES_BEFORE = 5
 
 

@@ -243,6 +243,11 @@ def test_answers_of_an_adapter_are_neither_frames_nor_damage(answer: bytes) -> N
     assert _receive(SLCAN, *_pieces(stream, [1])) == ([FIRST, FIRST], 0)
 
 
+@pytest.mark.parametrize("line", [b"Zz", b"zz", b"zV0101", b"z\x07", b"V0101F00"])
+def test_what_no_adapter_answers_is_damage(line: bytes) -> None:
+    assert _receive(SLCAN, line + b"\r") == read_slcan(line + b"\r") == ([], 1)
+
+
 def test_a_bell_has_no_end_of_its_own() -> None:
     assert _receive(SLCAN, b"\x07" + slcan.encode(FIRST) + b"\x07\x07" + slcan.encode(SECOND)) == (
         [FIRST, SECOND],
