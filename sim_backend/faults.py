@@ -124,6 +124,12 @@ class FaultPlan:
         return rig.model_copy(update=changed)
 
 
+def needs_wire(texts: Sequence[str]) -> bool:
+    """Whether a fault that a command line asks for is one of a wire or of the firmware."""
+    named = (text.partition(":")[0] for text in texts)
+    return any(kind in KINDS and KINDS[kind].wired for kind in named)
+
+
 def with_faults(rig: Rig, texts: Sequence[str], key: str = "--fault") -> Rig:
     """Return a rig with the faults that a command line asks for; their seed is the simulation's.
 

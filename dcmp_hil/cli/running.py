@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.makers import SinkMaker
 
-_FAULTS = "sim_backend.faults:with_faults"
+_FAULTS, _WIRED = "sim_backend.faults:with_faults", "sim_backend.faults:needs_wire"
+_BOARD = "backend.kind=sim-board"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 
 
@@ -50,9 +51,17 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     for sentence in warnings(rig):
         console.warn(sentence)
     if options.faults:
-        rig = find_named(_FAULTS, "--fault")(rig, options.faults)
+        rig = _with_faults(rig, rig_name, overrides, options.faults)
     with StopRequest() as stop:  # from here on: opening a viewer takes its time, too
         return _run(rig, options, stop)
+
+
+def _with_faults(rig: Rig, rig_name: str, overrides: Sequence[str], faults: tuple[str, ...]) -> Rig:
+    if rig.backend.kind == "sim" and find_named(_WIRED, "--fault")(faults):
+        console.warn(f"backend.kind = sim has no wire, and a fault needs one: this run has {_BOARD}.")
+        rig = load_rig(rig_name, [*overrides, _BOARD])
+    made: Rig = find_named(_FAULTS, "--fault")(rig, faults)
+    return made
 
 
 def _run(rig: Rig, options: Options, stop: StopRequest) -> int:

@@ -55,6 +55,15 @@ def test_a_run_keeps_what_went_wrong_on_purpose(cli: Cli, tmp_path: Path) -> Non
     assert json.loads((folder / "summary.json").read_text())["faults"] == ["plant.offset:V=0.1,at=0.5s"]
 
 
+def test_a_fault_of_the_wire_brings_its_wire_along(cli: Cli) -> None:
+    outcome = cli(
+        "run", "bench-1khz", "--fast", "--no-record", "--duration", "1.5", "--fault", "wire.hold:way=up,at=1s"
+    )
+    assert "this run has backend.kind=sim-board" in outcome.err.replace("\n", " ")
+    assert outcome.code == 4
+    assert "heard no valid command" in outcome.err.replace("\n", " ")
+
+
 def test_both_mistakes_of_a_command_line_are_told_at_once(cli: Cli) -> None:
     outcome = cli(*QUICK, "--fault", "wire.drp", "--fault", "plant.power:at=never")
     assert outcome.err.count("error: --fault") == 2
