@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from dcmp_hil.observers import Observer, Setting
     from dcmp_hil.values import Estimate, Sample
 
+_HEALTHY = Fault.NONE  # found here faster than in its class
+
 
 class Monitor(Protocol):
     """One thing watched, every period."""
@@ -28,12 +30,10 @@ class Finite:
 
     def check(self, sample: Sample, estimate: Estimate) -> None:
         """Raise TripError on NaN, infinity or a device fault."""
-        if sample.fault != Fault.NONE:
-            sentence, remedy = meaning_of(sample.fault)
-            raise TripError(
-                "device_fault", f"{sentence} (fault {sample.fault}, t = {sample.t:.3f} s).", remedy
-            )
-        t, position, voltage, _ = sample
+        t, position, voltage, fault = sample
+        if fault != _HEALTHY:
+            sentence, remedy = meaning_of(fault)
+            raise TripError("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
         x1, x2, w = estimate
         if not -math.inf < t + position + voltage + x1 + x2 + w < math.inf:  # a sum with a NaN is one
             raise TripError(
@@ -97,8 +97,8 @@ class DisturbanceWatch:
     """
 
     def __init__(self, observer: Observer, setting: Setting, limit: float, for_: float = 5e-3) -> None:
-        self._observer = observer
         self._diagnosis = Diagnosis(setting)
+        self._remember, self._update = self._diagnosis.add, observer.update
         self._keep = math.exp(-setting.period / 10e-3)
         self._limit = limit
         self._allowed = max(1, round(for_ / setting.period))
@@ -107,8 +107,8 @@ class DisturbanceWatch:
 
     def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - it has an estimate of its own
         """Raise TripError, which can find the likely cause, if the disturbance was too large for too long."""
-        self._diagnosis.add(sample)
-        w = self._observer.update(sample).disturbance
+        self._remember(sample)
+        _, _, w = self._update(sample)
         self._filtered = filtered = w + self._keep * (self._filtered - w)
         if -self._limit <= filtered <= self._limit:
             self._above = 0

@@ -45,10 +45,11 @@ class Overruns:
 
     def look(self, timing: Timing) -> DeadlineError | None:
         """Take the timing of one period; return why the run should end if too many were late."""
-        lateness, period = timing.lateness, self._period
+        _, lateness, compute = timing
+        period = self._period
         punctual = self._punctual + _LEAK * period
         self._punctual = punctual = min(lateness, punctual)
-        late = lateness - punctual > _LATE * period or timing.compute > period
+        late = lateness - punctual > _LATE * period or compute > period
         if self._cold:
             self._cold -= 1
             self.count += late
