@@ -1,5 +1,5 @@
 /* The registers of the STM32F405 that this firmware touches, and no others. Names and bits as in RM0090;
- * tests/firmware/test_registers.py holds them against the vendor's own description. */
+ * tests/target/test_registers.py holds them against the vendor's own description. */
 #ifndef REGS_H
 #define REGS_H
 
