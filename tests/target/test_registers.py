@@ -38,7 +38,7 @@ def test_nothing_escapes() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "said"),
     [
-        ("RCC_CR_HSION BIT(0)", "RCC_CR_HSION BIT(2)", "RCC_CR_HSION: 0x4 is not"),
+        ("RCC_CR_HSEON BIT(16)", "RCC_CR_HSEON BIT(18)", "RCC_CR_HSEON: 0x40000 is not"),
         ("CAN_BTR_TS1_POS 16u", "CAN_BTR_TS1_POS 15u", "CAN_BTR_TS1_POS: 0xf is not"),
         ("RCC_PLLCFGR_PLLQ_POS 24u", "RCC_PLLCFGR_PLLQ_POS 25u", "RCC_PLLCFGR_PLLQ_POS: 0x19 is not"),
         ("TIM_BDTR_MOE BIT(15)", "TIM_BDTR_MOE BIT(14)", "TIM_BDTR_MOE: 0x4000 is not what TIM1"),
