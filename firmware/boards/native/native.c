@@ -157,7 +157,8 @@ static void send(struct board *board, const uint8_t *bytes, size_t length)
 static void send_all(struct board *board)
 {
     uint8_t bytes[ROOM];
-    send(board, bytes, dcmp_port_transmit(&board->port, &board->device, bytes, sizeof bytes));
+    const size_t length = dcmp_port_transmit(&board->port, &board->device, bytes, sizeof bytes);
+    send(board, bytes, length);
 }
 
 static void count_frames(struct board *board, const uint8_t *bytes, size_t length)
@@ -198,8 +199,9 @@ static void serve_link(struct board *board)
         uint8_t replies[ROOM];
         const size_t got = (size_t)length;
         count_frames(board, bytes, got);
-        send(board, replies,
-             dcmp_port_receive(&board->port, &board->device, bytes, got, now_us(board), replies, sizeof replies));
+        const size_t replied =
+            dcmp_port_receive(&board->port, &board->device, bytes, got, now_us(board), replies, sizeof replies);
+        send(board, replies, replied);
         send_all(board);
     }
 }
