@@ -1,5 +1,7 @@
 #include "app.h"
 
+#include <stddef.h>
+
 #define CHUNK 64u /* bytes at a time */
 
 /* What the log has of earlier boots can be asked for over the wire. */
@@ -7,7 +9,7 @@ static struct dcmp_config with_last_fault(const struct dcmp_config *config, cons
 {
     struct dcmp_config full = *config;
     const struct fault_log_entry *newest = fault_log_look(log, 0u);
-    if (newest != 0) {
+    if (newest != NULL) {
         full.last_fault = (int32_t)newest->code;
         full.last_fault_detail = newest->detail;
     }
@@ -19,7 +21,7 @@ void app_start(struct app *app, const struct dcmp_config *config, enum dcmp_carr
 {
     fault_log_open(log);
     const struct dcmp_config full = with_last_fault(config, log);
-    dcmp_device_init(&app->device, &full, now_us);
+    (void)dcmp_device_init(&app->device, &full, now_us);
     dcmp_port_init(&app->port, carrier);
     app->log = log;
     app->boot_count = config->boot_count;
@@ -73,7 +75,7 @@ struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
         dcmp_device_overrun(&app->device);
     }
     dcmp_device_idle(&app->device, app->idle_percent);
-    dcmp_device_tick(&app->device, tick->now_us, tick->counts, &tick->edge);
+    (void)dcmp_device_tick(&app->device, tick->now_us, tick->counts, &tick->edge);
     say_failure(app, tick->now_us);
     app->life.decisions = app->device.tick;
     return app_settle(app, tick->now_us);
@@ -121,5 +123,5 @@ void app_say(struct app *app)
     const size_t room = ring_room(&app->sending);
     const size_t length =
         dcmp_port_transmit(&app->port, &app->device, bytes, room < sizeof bytes ? room : sizeof bytes);
-    ring_put(&app->sending, bytes, length); /* there is room */
+    (void)ring_put(&app->sending, bytes, length); /* there is room */
 }

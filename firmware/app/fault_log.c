@@ -30,7 +30,7 @@ void fault_log_add(struct fault_log *log, const struct fault_log_entry *entry)
 const struct fault_log_entry *fault_log_look(const struct fault_log *log, uint32_t back)
 {
     if (back >= FAULT_LOG_ENTRIES || back >= log->written) {
-        return 0;
+        return NULL;
     }
     return &log->entries[(log->written - 1u - back) % FAULT_LOG_ENTRIES];
 }

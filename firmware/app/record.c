@@ -1,5 +1,7 @@
 #include "record.h"
 
+#include <stddef.h>
+
 #include "dcmp_crc.h"
 
 #define MAGIC 0x504D4344u /* DCMP */
@@ -28,11 +30,11 @@ static bool is_blank(const struct record *record)
 
 const struct record *record_newest(const struct record *const sectors[RECORD_SECTORS], uint32_t count)
 {
-    const struct record *newest = 0;
+    const struct record *newest = NULL;
     for (uint32_t sector = 0; sector < RECORD_SECTORS; sector++) {
         for (uint32_t i = count; i > 0u; i--) { /* the newest come first then, and few checksums are taken */
             const struct record *record = &sectors[sector][i - 1u];
-            if ((newest == 0 || record->sequence > newest->sequence) && is_whole(record)) {
+            if ((newest == NULL || record->sequence > newest->sequence) && is_whole(record)) {
                 newest = record;
             }
         }
@@ -53,7 +55,7 @@ static bool is_in(const struct record *record, const struct record *sector, uint
 struct record_place record_next(const struct record *const sectors[RECORD_SECTORS], uint32_t count,
                                 const struct record *newest)
 {
-    const uint32_t sector = newest != 0 && is_in(newest, sectors[1], count) ? 1u : 0u;
+    const uint32_t sector = newest != NULL && is_in(newest, sectors[1], count) ? 1u : 0u;
     uint32_t place = count;
     while (place > 0u && is_blank(&sectors[sector][place - 1u])) {
         place--;
@@ -62,7 +64,7 @@ struct record_place record_next(const struct record *const sectors[RECORD_SECTOR
         const struct record_place here = {sector, place, false};
         return here;
     }
-    const struct record_place other = {newest != 0 ? 1u - sector : 0u, 0u, true};
+    const struct record_place other = {newest != NULL ? 1u - sector : 0u, 0u, true};
     return other;
 }
 

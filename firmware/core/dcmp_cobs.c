@@ -26,6 +26,8 @@ static size_t decode(const uint8_t *bytes, size_t length, uint8_t *decoded)
         } else if (i < length) {
             decoded[written++] = 0;
             code_at = i;
+        } else {
+            /* nothing is behind the last code */
         }
     }
     return written;
@@ -59,6 +61,8 @@ static enum dcmp_received finish(struct dcmp_cobs *cobs, struct dcmp_frame *fram
             received = DCMP_NOTHING;
         } else if (parse(cobs, frame)) {
             received = DCMP_FRAME;
+        } else {
+            /* damaged */
         }
     }
     dcmp_cobs_init(cobs);

@@ -16,7 +16,7 @@ static uint32_t periods(uint32_t us, uint32_t period_us)
 
 bool dcmp_device_init(struct dcmp_device *device, const struct dcmp_config *config, uint32_t now_us)
 {
-    static const struct dcmp_device nothing;
+    static const struct dcmp_device nothing = {0};
     *device = nothing;
     device->valid = dcmp_config_valid(config);
     if (!device->valid) {

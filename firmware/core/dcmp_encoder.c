@@ -89,6 +89,7 @@ static uint32_t windows_too_fast(const struct dcmp_encoder *encoder, int32_t spe
 
 void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
 {
+    const int32_t span = (SPEED_WINDOW_US + period_us - 1) / period_us;
     encoder->raw = 0;
     encoder->raw_before = 0;
     encoder->started = false;
@@ -97,8 +98,8 @@ void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
         encoder->past[i] = 0;
     }
     encoder->newest = 0;
-    encoder->span = (uint8_t)((SPEED_WINDOW_US + period_us - 1) / period_us);
-    encoder->window_us = encoder->span * period_us;
+    encoder->span = (uint8_t)span;
+    encoder->window_us = span * period_us;
     encoder->jump = 0;
     encoder->jumped = false;
     dcmp_history_init(&encoder->jumps);
@@ -120,6 +121,8 @@ void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t sp
         encoder->position = past(encoder, 1) + two_steps; /* the count between was wrong */
     } else if (!encoder->jumped) {
         encoder->position += step;
+    } else {
+        /* the next count says whether this one was wrong */
     }
     encoder->raw_before = encoder->started ? encoder->raw : counts & DCMP_COUNT_MASK;
     encoder->raw = counts & DCMP_COUNT_MASK;

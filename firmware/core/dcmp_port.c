@@ -60,7 +60,7 @@ static size_t encode(const struct dcmp_port *port, const struct dcmp_frame *fram
     return port->slcan.open ? dcmp_slcan_send(frame, out) : 0u; /* closed: said to nobody, not kept for later */
 }
 
-size_t dcmp_port_transmit(struct dcmp_port *port, struct dcmp_device *device, uint8_t *out, size_t room)
+size_t dcmp_port_transmit(const struct dcmp_port *port, struct dcmp_device *device, uint8_t *out, size_t room)
 {
     const size_t longest = port->carrier == DCMP_CARRIER_COBS ? DCMP_COBS_ENCODED_MAX : DCMP_SLCAN_ENCODED_MAX;
     struct dcmp_frame frame;

@@ -25,6 +25,6 @@ size_t dcmp_port_receive(struct dcmp_port *port, struct dcmp_device *device, con
                          uint32_t now_us, uint8_t *out, size_t room);
 
 /* Encode what the device wants to send, whole frames only, as long as there is room; returns the bytes written. */
-size_t dcmp_port_transmit(struct dcmp_port *port, struct dcmp_device *device, uint8_t *out, size_t room);
+size_t dcmp_port_transmit(const struct dcmp_port *port, struct dcmp_device *device, uint8_t *out, size_t room);
 
 #endif

@@ -64,6 +64,8 @@ static void receive_hello(struct dcmp_device *device, const struct dcmp_frame *f
             dcmp_parameters_restore(&device->parameters);
         } else if (dcmp_session_owns(session, hello.session)) {
             dcmp_session_renew(session, now_us);
+        } else {
+            /* somebody else's */
         }
     }
     identity.owned = dcmp_session_owns(session, hello.session);

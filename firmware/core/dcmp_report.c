@@ -1,5 +1,7 @@
 #include "dcmp_report.h"
 
+#include <stddef.h>
+
 #include "dcmp_protocol_hash.h"
 
 #define FAULT_CLASS_OTHER 7u
@@ -47,7 +49,7 @@ static void report_edge(struct dcmp_device *device, const struct dcmp_edge *edge
 {
     struct dcmp_frame frame;
     dcmp_transmit_withdraw(&device->transmit, DCMP_REPORT_EDGE); /* one belongs to its own SAMPLE */
-    if (edge == 0 || !edge->seen || device->parameters.value[DCMP_EDGE_STAMPS] == 0) {
+    if (edge == NULL || !edge->seen || device->parameters.value[DCMP_EDGE_STAMPS] == 0) {
         return;
     }
     const struct dcmp_edge_stamp stamp = {edge->counts, edge->age_us, (uint8_t)(device->tick & 0xFFu),

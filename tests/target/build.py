@@ -15,6 +15,8 @@ _PACKAGES = {
     "arm-none-eabi-nm": "binutils-arm-none-eabi",
     "clang": "clang",
     "cmake": "cmake",
+    "cppcheck": "cppcheck",
+    "gcc": "gcc",
     "qemu-system-arm": "qemu-system-arm",
 }
 

@@ -1,5 +1,7 @@
 #include "settings.h"
 
+#include <stddef.h>
+
 #include "app.h"
 #include "nvm.h"
 
@@ -71,14 +73,14 @@ static const struct record *newest(void)
 struct settings settings_read(int32_t board, int32_t reset_cause)
 {
     const struct record *found = newest();
-    if (found != 0 && is_possible(found)) {
+    if (found != NULL && is_possible(found)) {
         const struct settings settings = from_record(found, board, reset_cause);
         if (dcmp_config_valid(&settings.config)) {
             return settings;
         }
     }
     struct settings weak = from_record(&unknown, board, reset_cause);
-    weak.failure = found == 0 ? APP_NO_RECORD : APP_BAD_RECORD;
+    weak.failure = found == NULL ? APP_NO_RECORD : APP_BAD_RECORD;
     return weak;
 }
 

@@ -157,7 +157,8 @@ static void send(struct board *board, const uint8_t *bytes, size_t length)
 static void send_all(struct board *board)
 {
     uint8_t bytes[ROOM];
-    send(board, bytes, dcmp_port_transmit(&board->port, &board->device, bytes, sizeof bytes));
+    const size_t length = dcmp_port_transmit(&board->port, &board->device, bytes, sizeof bytes);
+    send(board, bytes, length);
 }
 
 static void count_frames(struct board *board, const uint8_t *bytes, size_t length)
@@ -168,6 +169,8 @@ static void count_frames(struct board *board, const uint8_t *bytes, size_t lengt
         } else if (board->inside) {
             board->inside = false;
             board->heard = true;
+        } else {
+            /* an end behind an end */
         }
     }
 }
@@ -189,15 +192,16 @@ static void link_closed(struct board *board)
 static void serve_link(struct board *board)
 {
     uint8_t bytes[CHUNK];
-    uint8_t replies[ROOM];
     const ssize_t length = pty_read(board->master, bytes, sizeof bytes);
     if (length < 0) {
         link_closed(board);
     } else {
+        uint8_t replies[ROOM];
         const size_t got = (size_t)length;
         count_frames(board, bytes, got);
-        send(board, replies,
-             dcmp_port_receive(&board->port, &board->device, bytes, got, now_us(board), replies, sizeof replies));
+        const size_t replied =
+            dcmp_port_receive(&board->port, &board->device, bytes, got, now_us(board), replies, sizeof replies);
+        send(board, replies, replied);
         send_all(board);
     }
 }
@@ -229,7 +233,7 @@ static void wait_for_host(struct board *board, uint16_t wait_ms)
         }
         wall = wall_us();
     }
-    take_output(board, dcmp_device_output(&board->device, now_us(board)));
+    (void)take_output(board, dcmp_device_output(&board->device, now_us(board)));
 }
 
 /* False at the end of the stream. */
@@ -246,7 +250,7 @@ static bool serve_plant(struct board *board)
     board->tick_at_us = wall_us();
     board->heard = false;
     look_for_host(board);
-    take_output(board, dcmp_device_tick(&board->device, tick.now_us, tick.counts, NULL));
+    (void)take_output(board, dcmp_device_tick(&board->device, tick.now_us, tick.counts, NULL));
     send_all(board);
     if (tick.wait_ms > 0u) {
         wait_for_host(board, tick.wait_ms);
@@ -259,7 +263,7 @@ static void serve(struct board *board)
 {
     bool going = true;
     while (going) {
-        struct pollfd ports[] = {
+        struct pollfd ports[2] = {
             {.fd = board->plant, .events = POLLIN},
             {.fd = board->link_up ? board->master : -1, .events = POLLIN}, /* a closed one would never let it wait */
         };
@@ -303,7 +307,7 @@ static bool take_field(struct dcmp_config *config, const char *argument)
         {"last_fault_detail", &config->last_fault_detail},
     };
     const char *equals = strchr(argument, '=');
-    const long value = equals == NULL ? 0 : strtol(equals + 1, NULL, 10);
+    const long value = equals == NULL ? 0 : strtol(&equals[1], NULL, 10);
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
         if (is(argument, fields[i].name)) {
             *fields[i].at = (int32_t)value;

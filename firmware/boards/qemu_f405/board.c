@@ -121,8 +121,9 @@ static void tell_plant(bool unasked)
 /* The emulator's wall clock: until a frame came, or for so long. */
 static void wait_for_host(uint32_t frames, uint32_t wait_ms)
 {
+    uint32_t ms = 0;
     SYSTICK->VAL = 0;
-    for (uint32_t ms = 0; ms < wait_ms && board.app.frames == frames;) {
+    while (ms < wait_ms && board.app.frames == frames) {
         pump(USART1, &board.app.sending);
         ms += (SYSTICK->CTRL & SYSTICK_CTRL_COUNTFLAG) != 0u ? 1u : 0u;
     }
@@ -157,7 +158,7 @@ void board_hold(void)
 static void start(void)
 {
     (void)clock_start(BOARD_CRYSTAL_HZ); /* the emulator has none: the waits end, and that is what is tried here */
-    board.settings = settings_read(BOARD_NUMBER, reset_cause());
+    board.settings = settings_read(BOARD_NUMBER, reset_take_cause());
     board.app.failure = board.settings.failure;
     app_start(&board.app, &board.settings.config,
               board.settings.link == RECORD_SLCAN ? DCMP_CARRIER_SLCAN : DCMP_CARRIER_COBS, &fault_log,

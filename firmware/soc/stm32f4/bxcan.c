@@ -43,14 +43,14 @@ static void let_in(const uint16_t *ids, uint32_t count)
     const uint32_t filters = (count + IDS_PER_FILTER - 1u) / IDS_PER_FILTER;
     CAN1->FMR |= CAN_FMR_FINIT;
     for (uint32_t i = 0; i < filters; i++) {
-        uint32_t word[2] = {0u, 0u};
+        uint32_t words[2] = {0u, 0u};
         for (uint32_t k = 0; k < IDS_PER_FILTER; k++) {
             const uint32_t nth = IDS_PER_FILTER * i + k;
             const uint32_t id = ids[nth < count ? nth : count - 1u];
-            word[k / 2u] |= (id << 5u) << (16u * (k % 2u));
+            words[k / 2u] |= (id << 5u) << (16u * (k % 2u));
         }
-        CAN1->F[i].R1 = word[0];
-        CAN1->F[i].R2 = word[1];
+        CAN1->F[i].R1 = words[0];
+        CAN1->F[i].R2 = words[1];
     }
     CAN1->FS1R = 0u;
     CAN1->FM1R = BIT(filters) - 1u;

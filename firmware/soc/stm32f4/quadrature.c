@@ -44,7 +44,7 @@ struct dcmp_edge quadrature_edge(uint32_t tick_us)
         return edge;
     }
     const uint32_t age_us = tick_us - at_us;
-    edge.seen = age_us <= INT32_MAX; /* one after the tick is not of this period */
+    edge.seen = age_us <= (uint32_t)INT32_MAX; /* one after the tick is not of this period */
     edge.age_us = (uint16_t)(age_us < AGE_MAX ? age_us : AGE_MAX);
     edge.direction = (TIM2->CR1 & TIM_CR1_DIR) != 0u ? -1 : 1;
     return edge;

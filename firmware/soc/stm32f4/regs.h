@@ -1,5 +1,5 @@
 /* The registers of the STM32F405 that this firmware touches, and no others. Names and bits as in RM0090;
- * tests/firmware/test_registers.py holds them against the vendor's own description. */
+ * tests/target/test_registers.py holds them against the vendor's own description. */
 #ifndef REGS_H
 #define REGS_H
 
@@ -18,8 +18,6 @@ struct rcc {
 };
 #define RCC ((struct rcc *)0x40023800u)
 
-#define RCC_CR_HSION BIT(0)
-#define RCC_CR_HSIRDY BIT(1)
 #define RCC_CR_HSEON BIT(16)
 #define RCC_CR_HSERDY BIT(17)
 #define RCC_CR_CSSON BIT(19)
@@ -32,7 +30,6 @@ struct rcc {
 #define RCC_PLLCFGR_PLLQ_POS 24u
 #define RCC_CFGR_SW_POS 0u
 #define RCC_CFGR_SWS_POS 2u
-#define RCC_CFGR_HPRE_POS 4u
 #define RCC_CFGR_PPRE1_POS 10u
 #define RCC_CFGR_PPRE2_POS 13u
 #define RCC_CIR_CSSF BIT(7)
@@ -48,8 +45,6 @@ struct rcc {
 #define RCC_APB1ENR_DACEN BIT(29)
 #define RCC_APB2ENR_TIM1EN BIT(0)
 #define RCC_APB2ENR_USART1EN BIT(4)
-#define RCC_CSR_LSION BIT(0)
-#define RCC_CSR_LSIRDY BIT(1)
 #define RCC_CSR_RMVF BIT(24)
 #define RCC_CSR_BORRSTF BIT(25)
 #define RCC_CSR_PADRSTF BIT(26)
@@ -57,7 +52,6 @@ struct rcc {
 #define RCC_CSR_SFTRSTF BIT(28)
 #define RCC_CSR_WDGRSTF BIT(29)
 #define RCC_CSR_WWDGRSTF BIT(30)
-#define RCC_CSR_LPWRRSTF BIT(31)
 
 /* ------------------------------------------------------------------------------------ power, flash */
 
@@ -129,7 +123,6 @@ struct timer {
 #define TIM1_SR_ALL 0x1EFFu
 #define TIM_SR_UIF BIT(0)
 #define TIM_SR_CC1IF BIT(1)
-#define TIM_SR_CC3IF BIT(3)
 #define TIM_SR_BIF BIT(7)
 #define TIM_EGR_UG BIT(0)
 #define TIM_CCMR_S_OWN 1u /* capture what is on the channel's own input */
@@ -197,7 +190,6 @@ struct can {
 #define CAN1 ((struct can *)0x40006400u)
 
 #define CAN_MCR_INRQ BIT(0)
-#define CAN_MCR_SLEEP BIT(1)
 #define CAN_MCR_TXFP BIT(2)
 #define CAN_MCR_ABOM BIT(6)
 #define CAN_MCR_DBF BIT(16)
@@ -223,8 +215,6 @@ struct can {
 #define CAN_BTR_TS2_POS 20u
 #define CAN_BTR_SJW_POS 24u
 #define CAN_TIR_TXRQ BIT(0)
-#define CAN_TIR_RTR BIT(1)
-#define CAN_TIR_IDE BIT(2)
 #define CAN_TIR_STID_POS 21u
 #define CAN_FMR_FINIT BIT(0)
 

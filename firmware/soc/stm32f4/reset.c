@@ -4,7 +4,7 @@
 
 enum { UNKNOWN = 0, POWER = 1, PIN = 2, SOFTWARE = 3, WATCHDOG = 4, BROWN_OUT = 5 };
 
-int32_t reset_cause(void)
+int32_t reset_take_cause(void)
 {
     /* Every cause sets the pin's flag too, and power-on sets brown-out's. */
     static const struct {

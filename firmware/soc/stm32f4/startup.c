@@ -10,7 +10,8 @@
 
 /* Where the linker script says that things are. */
 extern uint32_t stack_start[];
-extern uint32_t bss_start[], bss_end[];
+extern uint32_t bss_start[];
+extern uint32_t bss_end[];
 
 void *memcpy(void *restrict to, const void *restrict from, size_t length);
 void *memset(void *to, int value, size_t length);

@@ -6,7 +6,7 @@ void usart_start(struct usart *port, uint32_t bus_Hz, uint32_t baud)
     port->CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
 }
 
-static struct usart_event receive(struct usart *port, uint32_t status, struct ring *received)
+static struct usart_event receive(const struct usart *port, uint32_t status, struct ring *received)
 {
     struct usart_event event = {false, (uint8_t)(port->DR & 0xFFu), (status & USART_SR_ORE) != 0u};
     if ((status & USART_SR_RXNE) != 0u) { /* otherwise reading has taken note of the errors, and that was all */

@@ -38,12 +38,18 @@ def _mask(register: ET.Element) -> int:
 
 
 @functools.cache
-def description() -> dict[str, tuple[int, dict[int, Register]]]:
-    """Return every peripheral's base address and its registers by offset."""
+def peripherals(chip: str = "STM32F429x") -> dict[str, ET.Element]:
+    """Return every peripheral of a chip as the vendor wrote it down."""
     packed = (importlib.resources.files("pyocd") / "debug/svd/svd_data.zip").read_bytes()
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        root = ET.fromstring(archive.read("STM32F429x.svd"))  # noqa: S314 - from a wheel with a hash
-    elements = {element.findtext("name", ""): element for element in root.iter("peripheral")}
+        root = ET.fromstring(archive.read(f"{chip}.svd"))  # noqa: S314 - from a wheel with a hash
+    return {element.findtext("name", ""): element for element in root.iter("peripheral")}
+
+
+@functools.cache
+def description() -> dict[str, tuple[int, dict[int, Register]]]:
+    """Return every peripheral's base address and its registers by offset."""
+    elements = peripherals()
     found = {}
     for name, element in elements.items():
         described = elements.get(element.get("derivedFrom", ""), element)

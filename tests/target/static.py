@@ -1,0 +1,222 @@
+"""Cppcheck with its MISRA addon, and gcc's analyzer, over every program of the firmware."""
+
+from __future__ import annotations
+
+import fnmatch
+import functools
+import json
+import re
+import subprocess
+from typing import TYPE_CHECKING, NamedTuple
+
+from tests.target.build import FIRMWARE, needed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
+
+TABLE = FIRMWARE.parent / "docs" / "misra.md"
+
+_CHIP = ("-I", "core", "-I", "app", "-I", "soc/stm32f4", "-I", "boards/f405", "-DBOARD_CRYSTAL_HZ=8000000u")
+_WARNINGS = (
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wsign-conversion",
+    "-Wshadow",
+    "-Wundef",
+    "-Wstrict-prototypes",
+)
+_SHORTEST_REASON = 30  # characters: a word or two are none
+
+
+class Program(NamedTuple):
+    """Files that are looked at together, and how they are compiled."""
+
+    sources: tuple[str, ...]  # files and folders
+    options: tuple[str, ...]
+    for_chip: bool = True
+
+    def files(self) -> list[Path]:
+        """Return its C files."""
+        found = [FIRMWARE / source for source in self.sources]
+        return sorted(path for at in found for path in ([at] if at.suffix == ".c" else at.glob("*.c")))
+
+
+def _chip_folder() -> tuple[str, ...]:
+    """Return what every program for the chip has of its folder."""
+    files = sorted((FIRMWARE / "soc/stm32f4").glob("*.c"))
+    return tuple(f"soc/stm32f4/{file.name}" for file in files if not file.name.startswith("amplifier_"))
+
+
+PROGRAMS = {
+    # whole programs, so that what is asked of one has its answer
+    "bench_f405_dac": Program(
+        ("core", "app", *_chip_folder(), "soc/stm32f4/amplifier_dac.c", "boards/f405", "boards/bench_f405"),
+        (*_CHIP, "-DBOARD_NUMBER=3"),
+    ),
+    "native": Program(
+        ("core", "boards/native"),
+        ("-I", "core", "-I", "boards/native", "-D_XOPEN_SOURCE=700"),
+        for_chip=False,
+    ),
+    # of these only what the others do not have
+    "bench_f405_pwm": Program(
+        ("soc/stm32f4/amplifier_pwm.c", "boards/bench_f405"), (*_CHIP, "-DBOARD_NUMBER=5")
+    ),
+    "qemu_f405": Program(("boards/qemu_f405", "boards/native/plant_port.c"), (*_CHIP, "-I", "boards/native")),
+    "hostlib": Program(("boards/hostlib",), ("-I", "core"), for_chip=False),
+}
+
+
+class Finding(NamedTuple):
+    """What a tool says of a line."""
+
+    rule: str  # "15.5" of MISRA, or cppcheck's own word
+    file: str  # from firmware/
+    line: int
+
+
+class Deviation(NamedTuple):
+    """A row of docs/misra.md."""
+
+    rule: str
+    where: str  # a pattern
+    why: str
+    version: str = "2.10"  # the one of cppcheck that needs it
+
+
+# ------------------------------------------------------------------------------------ cppcheck
+
+
+def _addon(folder: Path) -> Path:
+    """Write down how the addon is called.
+
+    Cppcheck drops a second finding in a line whose words are those of the first. Without the rules' texts,
+    which are not free, all have the same words; with a file that has next to none they say the rule's number.
+    """
+    texts = folder / "texts.txt"
+    texts.write_text("Appendix A Summary of guidelines\nRule 1.1 Required\nNo text.\n")
+    call = folder / "misra.json"
+    call.write_text(json.dumps({"script": "misra.py", "args": [f"--rule-texts={texts}"]}))
+    return call
+
+
+def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Finding]:
+    """Return what cppcheck and the MISRA addon say of some files, compiled like a program's."""
+    command = [
+        needed("cppcheck"),
+        f"--addon={_addon(folder)}",
+        "--std=c11",
+        "--enable=warning,style,performance,portability",
+        f"--platform={'arm32-wchar_t4' if program.for_chip else 'unix64'}",
+        "--quiet",
+        "--suppress=normalCheckLevelMaxBranches",  # newer ones say that they could look longer
+        "--template={file}\t{line}\t{id}",
+        "--template-location=",
+        *program.options,
+        *(str(file.relative_to(FIRMWARE) if file.is_relative_to(FIRMWARE) else file) for file in files),
+    ]
+    done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = set()
+    for line in done.stderr.splitlines():
+        if line:
+            file, number, rule = line.split("\t")
+            found.add(Finding(rule.removeprefix("misra-c2012-"), file, int(number)))
+    return sorted(found)
+
+
+@functools.cache
+def _included(file: Path, folders: tuple[str, ...]) -> frozenset[str]:
+    """Return the headers of ours that a file sees, those of headers too."""
+    seen: set[str] = set()
+    for name in re.findall(r'^#include "(.+)"', file.read_text(), re.MULTILINE):
+        for folder in (str(file.parent.relative_to(FIRMWARE)), *folders):
+            header = FIRMWARE / folder / name
+            if header.exists():
+                seen |= {f"{folder}/{name}"} | _included(header, folders)
+                break
+    return frozenset(seen)
+
+
+def headers(program: Program) -> set[str]:
+    """Return the headers that a program sees."""
+    folders = tuple(
+        after for before, after in zip(program.options, program.options[1:], strict=False) if before == "-I"
+    )
+    return set().union(*(_included(file, folders) for file in program.files()))
+
+
+def everywhere(said: dict[str, list[Finding]]) -> set[Finding]:
+    """Return what is so in the firmware: what one program leaves unused of a header, another one may use."""
+    found: set[Finding] = set()
+    for finding in {finding for findings in said.values() for finding in findings}:
+        seeing = [name for name in said if finding.file in headers(PROGRAMS[name])]
+        unused = finding.rule in {"2.3", "2.4", "2.5"}
+        if not (unused and seeing) or all(finding in said[name] for name in seeing):
+            found.add(finding)
+    return found
+
+
+# ------------------------------------------------------------------------------------- deviations
+
+
+def deviations(page: str) -> list[Deviation]:
+    """Return the page's table, a row for every rule and place; one without a reason is an error."""
+    rows = []
+    for line in page.splitlines():
+        cells = [cell.strip() for cell in line.removeprefix("|").removesuffix("|").split(" | ")]
+        if not re.match(r"\| (?!rule)", line):
+            continue
+        assert len(cells) == 3, f"rule | where | why: {line}"
+        assert len(cells[2]) >= _SHORTEST_REASON, f"{cells[0]} has no reason: {line}"
+        places = re.findall(r"`([^`]+)`", cells[1])
+        assert places, f"{cells[0]} has no place: {line}"
+        version = re.search(r" \((2\.\d+)\)$", cells[1])
+        rest = (cells[2], version[1]) if version else (cells[2],)
+        rows += [Deviation(rule, place, *rest) for rule in cells[0].split(", ") for place in places]
+    return rows
+
+
+def judge(found: Iterable[Finding], rows: list[Deviation], version: str = "2.10") -> Iterator[str]:
+    """Yield every finding that nobody accounts for, and every deviation that nothing needs."""
+    idle = {row for row in rows if row.version == version}
+    for finding in sorted(found):
+        account = [
+            row for row in rows if row.rule == finding.rule and fnmatch.fnmatch(finding.file, row.where)
+        ]
+        idle -= set(account)
+        if not account:
+            yield f"{finding.file}:{finding.line}: {finding.rule}"
+    yield from (f"docs/misra.md: nothing in {row.where} needs {row.rule}" for row in sorted(idle))
+
+
+# --------------------------------------------------------------------------------- gcc's analyzer
+
+
+def analyze(program: Program, file: Path, out: Path) -> str:
+    """Return what gcc's analyzer says of a file."""
+    mine = (
+        [needed("arm-none-eabi-gcc"), "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft", "-ffreestanding"]
+        if program.for_chip
+        else [needed("gcc"), "-fPIC"]
+    )
+    said = ""
+    for level in ("-O0", "-O2"):  # the optimizer hides some defects from the analyzer, and uncovers others
+        command = [
+            *mine,
+            "-std=c11",
+            level,
+            "-fanalyzer",
+            *_WARNINGS,
+            *program.options,
+            "-c",
+            str(file),
+            "-o",
+            str(out),
+        ]
+        done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        said += done.stderr
+    return said
