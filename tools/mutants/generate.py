@@ -167,20 +167,15 @@ def changes(node: Node) -> Iterator[Change]:
             pass
 
 
-def _place(node: Node | None) -> str:
-    """Return the name of what a piece of the source stands in."""
-    while node is not None:
-        if node.type in ("function_definition", "preproc_def", "init_declarator"):
-            name: Node | None = node
-            while name is not None and name.type != "identifier":
-                inner = name.child_by_field_name("declarator") or name.child_by_field_name("name")
-                name = inner
-            inside = node.type != "init_declarator" or node.parent is None or node.parent.parent is None
-            outermost = inside or node.parent.parent.type == "translation_unit"  # type: ignore[union-attr]
-            if name is not None and outermost:
-                return text_of(name)
-        node = node.parent
-    return ""
+def _place(node: Node) -> str:
+    """Return the name of the outermost thing that a piece of the source stands in."""
+    outer, name = node, None
+    while outer.parent is not None and outer.parent.parent is not None:
+        outer = outer.parent
+    name = outer.child_by_field_name("declarator") or outer.child_by_field_name("name")
+    while name is not None and name.type != "identifier":
+        name = name.child_by_field_name("declarator")
+    return text_of(name) if name is not None else ""
 
 
 def _plain(text: bytes) -> str:
