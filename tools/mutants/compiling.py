@@ -48,11 +48,10 @@ class Workshop:
     def __init__(self, folder: Path, jobs: int) -> None:
         self.folder = folder
         self.jobs = jobs
-        self.objects: dict[str, Path] = {}
-        self.originals: dict[str, bytes] = {}
-        for path in [*sources(), *app_sources(), HERE / "core_checks.c"]:
-            self.objects[path.name] = self._original(path, RUN, ".o")
-            self.originals[path.name] = self._original(path, COMPARED, ".compared.o").read_bytes()
+        self.paths = {path.name: path for path in [*sources(), *app_sources(), HERE / "core_checks.c"]}
+        with ThreadPoolExecutor(jobs) as pool:
+            objects = list(pool.map(lambda path: self._original(path, RUN, ".o"), self.paths.values()))
+        self.objects = dict(zip(self.paths, objects, strict=True))
         self.whole = folder / "original.so"
         self._link(self.objects, self.whole)
 
@@ -88,7 +87,13 @@ class Workshop:
         """Compile mutants, each once: what the compiler makes the same of is the same."""
         with ThreadPoolExecutor(self.jobs) as pool:
             compared = list(pool.map(self._compared, enumerate(mutants)))
-            known = {(name, compiled): "the same as the original" for name, compiled in self.originals.items()}
+            known = {
+                (
+                    file,
+                    self._original(self.paths[file], COMPARED, ".compared.o").read_bytes(),
+                ): "the same as the original"
+                for file in {mutant.file for mutant in mutants}
+            }
             why = []
             for mutant, compiled in zip(mutants, compared, strict=True):
                 key = (mutant.file, compiled or b"")

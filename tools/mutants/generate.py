@@ -11,7 +11,7 @@ import tree_sitter_c
 from tree_sitter import Language, Node, Parser
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 OPERATORS: dict[str, tuple[str, ...]] = {
@@ -35,7 +35,7 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change of one file, and how it is named: by what stands in the line, which outlives an edit elsewhere.
+    """One change of one file; its name is what stands in the line, which outlives an edit elsewhere.
 
     Parameters
     ----------
@@ -116,18 +116,24 @@ def _condition(node: Node) -> Iterator[Change]:
         yield from _replace(inner, "true")
 
 
-def _number(start: int, text: str) -> Iterator[Change]:
+def _numbers(node: Node) -> Iterator[Change]:
     """Put one more for a number, and 0 for 1."""
-    for found in _NUMBER.finditer(text):
+    remarks_blank = _REMARK.sub(lambda remark: " " * len(remark[0]), text_of(node))
+    for found in _NUMBER.finditer(remarks_blank):
         digits, suffix = found.groups()
         value = int(digits, 0)
         more = f"{value + 1:#x}" if digits[:2] in ("0x", "0X") else str(value + 1)
         for other in [more, "0"] if value == 1 else [more]:
-            yield Change(start + found.start(), start + found.end(), other + suffix)
+            start, end = node.start_byte + found.start(), node.start_byte + found.end()
+            yield Change(start, end, other + suffix)
+
+
+def _truth(node: Node) -> Iterator[Change]:
+    yield from _replace(node, "false" if node.type == "true" else "true")
 
 
 def _deleted(node: Node) -> Iterator[Change]:
-    """Leave out a statement; but a function's last `return` only if it returns nothing: without, it has no meaning."""
+    """Leave out a statement, but not what a function returns at its end: without, it has no meaning."""
     block = node.parent
     last = block is not None and block.parent is not None and block.parent.type == "function_definition"
     if node.type == "return_statement" and last and node.named_children:
@@ -143,28 +149,18 @@ def _entries(node: Node) -> Iterator[Change]:
         yield from _replace(entry, *others[:1])
 
 
-def changes(node: Node) -> Iterator[Change]:
-    """Yield what may be done to a piece of the source itself."""
-    match node.type:
-        case "binary_expression":
-            yield from _operator(node)
-            yield from _operands(node)
-        case "unary_expression" | "assignment_expression" | "update_expression":
-            yield from _operator(node)
-        case "if_statement" | "while_statement" | "for_statement" | "conditional_expression":
-            yield from _condition(node)
-        case "number_literal":
-            yield from _number(node.start_byte, text_of(node))
-        case "preproc_arg":
-            yield from _number(node.start_byte, _REMARK.sub(lambda m: " " * len(m[0]), text_of(node)))
-        case "true" | "false":
-            yield from _replace(node, "false" if node.type == "true" else "true")
-        case "initializer_list":
-            yield from _entries(node)
-        case "expression_statement" | "return_statement" | "break_statement" | "continue_statement":
-            yield from _deleted(node)
-        case _:
-            pass
+CHANGES: dict[str, tuple[Callable[[Node], Iterator[Change]], ...]] = {
+    "binary_expression": (_operator, _operands),
+    **dict.fromkeys(("unary_expression", "assignment_expression", "update_expression"), (_operator,)),
+    **dict.fromkeys(("if_statement", "while_statement", "for_statement"), (_condition,)),
+    "conditional_expression": (_condition,),
+    **dict.fromkeys(("number_literal", "preproc_arg"), (_numbers,)),
+    **dict.fromkeys(("true", "false"), (_truth,)),
+    "initializer_list": (_entries,),
+    **dict.fromkeys(("expression_statement", "return_statement"), (_deleted,)),
+    **dict.fromkeys(("break_statement", "continue_statement"), (_deleted,)),
+}
+"""What may be done to a piece of the source, by its kind."""
 
 
 def _place(node: Node) -> str:
@@ -188,7 +184,7 @@ def mutants(path: Path) -> list[Mutant]:
     tree = Parser(Language(tree_sitter_c.language())).parse(source)
     found: dict[Change, str] = {}
     for node in walk(tree.root_node):
-        for change in changes(node):
+        for change in (made for make in CHANGES.get(node.type, ()) for made in make(node)):
             if source[change.start : change.end] != change.text.encode():
                 found.setdefault(change, _place(node))
     seen: Counter[tuple[str, str, str]] = Counter()

@@ -41,7 +41,12 @@ def names(path: Path) -> dict[Key, str]:
 def says(mutant: Mutant) -> str:
     """Return a mutant as `mutants.toml` would name it."""
     number = f"number = {mutant.number}\n" if mutant.number > 1 else ""
-    fields = (("file", mutant.file), ("where", mutant.where), ("line", mutant.line), ("becomes", mutant.becomes))
+    fields = (
+        ("file", mutant.file),
+        ("where", mutant.where),
+        ("line", mutant.line),
+        ("becomes", mutant.becomes),
+    )
     return "[[mutant]]\n" + "".join(f"{name} = '''{value}'''\n" for name, value in fields) + number
 
 

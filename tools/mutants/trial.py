@@ -1,4 +1,4 @@
-"""The core's tests, collected once, then run in a fork for every mutant: importing all of it takes longer than a trial.
+"""The core's tests, collected once and run in a fork for every mutant: to import them takes long.
 
 `python -m tools.mutants.trial TASK RESULT [TEST ...]`, as `tools.mutants.trials` starts it.
 """
@@ -44,7 +44,7 @@ class Trials:
         self.running = mmap.mmap(-1, 4)
 
     def pytest_configure(self) -> None:
-        """Have Hypothesis try the same examples each time; imported here, for pytest wants to see it first."""
+        """Have Hypothesis try the same examples each time; pytest wants to see it first, hence here."""
         from hypothesis import Phase, settings
 
         phases = [Phase.explicit, Phase.generate]
@@ -55,7 +55,7 @@ class Trials:
         """Try every mutant; the tests that found one in a file are the first to look at the file's next."""
         interface()
         gc.freeze()
-        tests = sorted(session.items, key=lambda test: "@slow" in test.keywords)
+        tests = session.items
         verdict, test = self._forked(tests, self.task["original"])
         if verdict != "survived":
             raise pytest.UsageError(f"without a mutant: {verdict} by {test and test.nodeid}")

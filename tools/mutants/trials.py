@@ -20,21 +20,34 @@ if TYPE_CHECKING:
     from tools.mutants.compiling import Compiled
     from tools.mutants.generate import Mutant
 
-_ABOUT = ("amplifier", "app", "drive", "encoder", "parameters", "records", "reports", "rings", "sessions", "supervisor")
+_ABOUT = (
+    "amplifier",
+    "app",
+    "drive",
+    "encoder",
+    "parameters",
+    "records",
+    "reports",
+    "rings",
+    "sessions",
+    "supervisor",
+)
 TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in (*_ABOUT, "watchdog"))
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant: `tests`, `time`, `survived` or `dropped`, and by which test or for which reason."""
+    """What became of a mutant: `tests`, `time`, `survived` or `dropped`, and by which test, or why."""
 
     mutant: Mutant
     what: str
     by: str
 
 
-def _start(folder: Path, job: int, share: Sequence[tuple[int, str, str]], tests: Sequence[str]) -> subprocess.Popen[str]:
+def _start(
+    folder: Path, job: int, share: Sequence[tuple[int, str, str]], tests: Sequence[str]
+) -> subprocess.Popen[str]:
     """Start a process that tries its share of the mutants."""
     task = {"original": str(folder / "original.so"), "mutants": share}
     (folder / f"task{job}.json").write_text(json.dumps(task), "utf-8")
@@ -47,7 +60,9 @@ def _start(folder: Path, job: int, share: Sequence[tuple[int, str, str]], tests:
     )
 
 
-def _tried(folder: Path, compiled: Sequence[Compiled], jobs: int, tests: Sequence[str]) -> dict[int, tuple[str, str]]:
+def _tried(
+    folder: Path, compiled: Sequence[Compiled], jobs: int, tests: Sequence[str]
+) -> dict[int, tuple[str, str]]:
     """Try what can be tried; return verdict and test by number."""
     whole = [(i, each.mutant.file, str(each.library)) for i, each in enumerate(compiled) if each.library]
     started = [_start(folder, job, whole[job::jobs], tests) for job in range(jobs)]
