@@ -48,7 +48,7 @@ def test_broken_code_is_noticed_by_a_test_that_is_there() -> None:
 def test_tests_that_fail_without_a_mutant_say_nothing(tmp_path: Path) -> None:
     compiler()
     (tmp_path / "test_broken.py").write_text("def test_broken() -> None:\n    assert False\n", "utf-8")
-    with pytest.raises(RuntimeError, match="without a mutant: tests by .*test_broken"):
+    with pytest.raises(RuntimeError, match=r"without a mutant: tests by .*test_broken"):
         verdicts([], 1, [str(tmp_path)])
 
 

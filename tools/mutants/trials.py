@@ -20,19 +20,9 @@ if TYPE_CHECKING:
     from tools.mutants.compiling import Compiled
     from tools.mutants.generate import Mutant
 
-_ABOUT = (
-    "amplifier",
-    "app",
-    "drive",
-    "encoder",
-    "parameters",
-    "records",
-    "reports",
-    "rings",
-    "sessions",
-    "supervisor",
-)
-TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in (*_ABOUT, "watchdog"))
+_ABOUT = ("amplifier", "app", "drive", "encoder", "memory", "parameters", "records", "reports", "rings")
+_ABOUT += ("sessions", "supervisor", "watchdog")
+TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _ABOUT)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
 
