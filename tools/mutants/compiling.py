@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from tools.mutants.generate import Mutant
 
 COMPARED = ("-O2",)
-RUN = ("-O1", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error")
-"""What a mutant does that means nothing in C ends it: no runtime library is needed for that."""
+RUN = ("-O1", "-fstack-protector-all", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error")
+"""What means nothing in C ends a mutant, and so does a smashed stack; that needs no runtime library."""
 WHOLE = ("-std=c11", "-ffreestanding", "-fPIC", "-w", f"-I{CORE}", f"-I{APP}", f"-I{HERE}")
 
 

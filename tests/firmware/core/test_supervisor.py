@@ -78,6 +78,12 @@ def test_the_table_has_no_other_way(core: Core, state: int) -> None:
             assert after == (IDLE if event == lib.DCMP_EVENT_CLEAR else FAULT)
         if state == BOOT:
             assert after == (IDLE if event == lib.DCMP_EVENT_TICK else BOOT)
+        if after == BOOT:
+            assert state == BOOT
+        if after == ARMING:
+            assert state == ARMING or (
+                state == IDLE and event in (lib.DCMP_EVENT_ARM, lib.DCMP_EVENT_ARM_LAST)
+            )
         if after == RUN:
             assert state == RUN or (state, event) == (ARMING, lib.DCMP_EVENT_ARM_LAST)
     assert lib.dcmp_supervisor_next(RUN, lib.DCMP_EVENT_ARM_LAST) == RUN
@@ -159,6 +165,41 @@ def test_a_fault_is_left_by_an_edge_only(core: Core) -> None:
     assert drive(arm=0, clear=1) == IDLE
 
 
+@pytest.mark.parametrize(
+    "drives", [[{}] * 5, [{"clear": 1}] * 5, [{"arm": 1}] * 5, [{"arm": 1}, {}, {"arm": 1}]]
+)
+def test_a_fault_stays_without_an_edge(core: Core, drives: list[dict[str, int]]) -> None:
+    """Neither 0 V alone nor a `clear` that was never down ends it."""
+    bench = Bench(core)
+    bench.go_to(FAULT)
+    for fields in drives:
+        bench.tick()
+        assert bench.drive(**{"arm": 0, **fields})
+        assert bench.state == FAULT
+
+
+def test_every_fault_wants_an_edge_of_its_own(core: Core) -> None:
+    bench = Bench(core)
+    bench.go_to(FAULT)
+    for clear, state in [(0, FAULT), (1, IDLE)]:
+        bench.tick()
+        bench.drive(arm=0, clear=clear)
+        assert bench.state == state
+    bench.send("STOP", reason=3)
+    bench.tick()
+    bench.drive(arm=0, clear=1)
+    assert bench.state == FAULT
+
+
+def test_release_is_stronger_than_arm(core: Core) -> None:
+    """Such a DRIVE is dropped before; were it not, it would not drive."""
+    supervisor = core.new("struct dcmp_supervisor *", {"state": RUN})
+    core.lib.dcmp_supervisor_drive(
+        supervisor, core.new("struct dcmp_drive *", {"arm": 1, "release": 1}), True
+    )
+    assert supervisor.state == IDLE
+
+
 def test_an_edge_belongs_to_one_session(core: Core) -> None:
     bench = Bench(core)
     bench.go_to(FAULT)
@@ -191,6 +232,29 @@ def test_the_first_cause_stays(core: Core) -> None:
     assert bench.device.supervisor.fault.tick == tick
 
 
+def test_silence_is_found_before_what_the_board_says(core: Core) -> None:
+    """Corrupt frames, a failure, a link that goes down: each looks at the time first."""
+    for after in (
+        lambda bench: bench.corrupt(),
+        lambda bench: core.lib.dcmp_device_fail(bench.device, 9, 0, bench.now),
+        _link_down,
+    ):
+        bench = Bench(core)
+        bench.run()
+        bench.drive(5000)
+        bench.corrupt(9)
+        bench.advance(20001)
+        after(bench)
+        assert bench.fault == (1, 20001)
+
+
+def test_link_that_is_down_has_no_detail(core: Core) -> None:
+    bench = Bench(core)
+    bench.run()
+    _link_down(bench)
+    assert bench.fault == (2, 0)
+
+
 def test_nothing_arms_while_the_link_is_down(core: Core) -> None:
     bench = Bench(core)
     bench.hello()
@@ -218,6 +282,17 @@ def test_fault_is_sent_at_once_and_every_100_ms(core: Core) -> None:
     assert [i for i, name in enumerate(names) if name == "FAULT"] == [0, 101, 202, 303]
     assert {tuple(f.values()) for name, f in bench.seen if name == "FAULT"} == {(3, happened, 3)}
     assert all(f["fault_class"] == 3 and f["state"] == FAULT for name, f in bench.seen if name == "SAMPLE")
+
+
+def test_a_second_cause_sends_nothing(core: Core) -> None:
+    bench = Bench(core)
+    bench.run()
+    bench.send("STOP", reason=3)
+    bench.tick()
+    bench.seen.clear()
+    bench.send("STOP", reason=4)
+    bench.tick(2)
+    assert "FAULT" not in dict(bench.seen)
 
 
 def test_a_second_fault_is_sent_at_once_too(core: Core) -> None:
