@@ -20,20 +20,9 @@ if TYPE_CHECKING:
     from tools.mutants.compiling import Compiled
     from tools.mutants.generate import Mutant
 
-_ABOUT = (
-    "amplifier",
-    "app",
-    "drive",
-    "encoder",
-    "encoder_state",
-    "memory",
-    "parameters",
-    "records",
-    "reports",
-    "rings",
-)
-_ABOUT += ("sessions", "supervisor", "watchdog")
-TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _ABOUT)
+_STATE = ("amplifier", "drive", "encoder", "encoder_state", "memory", "sessions", "supervisor", "watchdog")
+_AROUND = ("app", "parameters", "records", "reports", "rings")
+TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
 

@@ -239,7 +239,8 @@ def test_what_has_no_room_waits(core: Core, room: int) -> None:
     board.said()
     sending = core_ring(board.app.sending, core)
     assert core.lib.ring_put(sending, b"x" * 1024, 1024)
-    for number in range(1, 14):
+    asked = [*range(1, 15), 1, 2]
+    for number in asked:
         board.say("PARAMETER_GET", id=number)
     out = core.new("uint8_t[]", 1024)
     core.lib.ring_take(sending, out, room)
@@ -248,7 +249,7 @@ def test_what_has_no_room_waits(core: Core, room: int) -> None:
     said = b"".join(board.said() for _ in range(6))
     frames = [frame.decode() for frame in said.split(b"\r") if frame]
     answers = [decode(int(frame[1:4], 16), bytes.fromhex(frame[5:])) for frame in frames]
-    assert [fields["id"] for _, fields in answers] == list(range(1, 14))
+    assert [fields["id"] for _, fields in answers] == asked
 
 
 def test_answers_without_room_are_counted(core: Core) -> None:
