@@ -77,7 +77,9 @@ def table(found: Sequence[Verdict], named: Mapping[Key, str]) -> str:
     head = f"| {'file':20} |" + "".join(f"{column:>9} |" for column in COLUMNS)
     lines = [head, f"|{'-' * 22}|" + f"{'-' * 9}:|" * len(COLUMNS)]
     lines += [_row(name, [each for each in found if each.mutant.file == name], named) for name in files]
-    return "\n".join([*lines, _row("all", found, named)]) + "\n"
+    reasons = Counter(verdict.by for verdict in found if verdict.what == "dropped")
+    left_out = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items())) or "none"
+    return "\n".join([*lines, _row("all", found, named), "", f"Dropped: {left_out}."]) + "\n"
 
 
 def page(found: Sequence[Verdict], named: Mapping[Key, str], wrong: Sequence[str], took_s: float) -> str:

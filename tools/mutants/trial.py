@@ -25,6 +25,8 @@ SURVIVED, KILLED, BROKEN = 0, 101, 102
 """How a child ends."""
 TIME_LIMIT_S = 1.5
 """Of the processor, for one test: far more than the slowest needs."""
+WALL_LIMIT_S = 60
+"""By the clock, should one wait for something."""
 PLAIN = ["-q", "-s", "-p", "no:cacheprovider", "-p", "no:faulthandler", "-p", "no:xdist", "-p", "no:cov"]
 PLAIN += ["-p", "no:hypothesispytest"]
 
@@ -78,7 +80,7 @@ class Trials:
             return "survived", None
         if os.WIFEXITED(status) and os.WEXITSTATUS(status) != KILLED:
             raise pytest.UsageError(f"a trial of {library} broke")
-        slow = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGPROF
+        slow = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGPROF, signal.SIGALRM)
         return "time" if slow else "tests", tests[int.from_bytes(self.running[:4], "little")]
 
     def _run(self, tests: Sequence[pytest.Item], library: str) -> None:
@@ -91,6 +93,7 @@ class Trials:
             for number, test in enumerate(tests):
                 self.running[:4] = number.to_bytes(4, "little")
                 signal.setitimer(signal.ITIMER_PROF, TIME_LIMIT_S)
+                signal.alarm(WALL_LIMIT_S)
                 following = tests[number + 1] if number + 1 < len(tests) else None
                 test.config.hook.pytest_runtest_protocol(item=test, nextitem=following)
         except BaseException:  # noqa: BLE001  # whatever it was, a child must not go on as the parent

@@ -25,6 +25,9 @@ _AROUND = ("app", "parameters", "records", "reports", "rings")
 TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
+SINGLE = {"OPENBLAS_NUM_THREADS": "1"}
+"""A process that forks has no other threads."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -46,7 +49,7 @@ def _start(
     files = [str(folder / f"task{job}.json"), str(folder / f"result{job}.json")]
     command = [sys.executable, "-m", "tools.mutants.trial", *files, *tests]
     return subprocess.Popen(  # noqa: S603
-        command, cwd=ROOT, env=inherited, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command, cwd=ROOT, env=inherited | SINGLE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
 
 
