@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tools.mutants.generate import Mutant
 
 _STATE = ("amplifier", "drive", "encoder", "encoder_state", "memory", "sessions", "supervisor", "watchdog")
-_AROUND = ("app", "parameters", "records", "reports", "rings")
+_AROUND = ("app", "latched", "parameters", "records", "reports", "rings")
 TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
