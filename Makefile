@@ -20,7 +20,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults firmware bench lock clean
+.PHONY: help run test check pytest faults mutants firmware bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -55,6 +55,9 @@ faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real h
 	$(BIN)/python -m tools.host_endings --n 10 \
 		--markdown reports/host-endings.md --json reports/host-endings.json || failed=1; \
 	exit $$failed
+
+mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/firmware/mutants.toml says why not
+	@$(BIN)/python -m tools.mutants $(ARGS)
 
 firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes
 	@$(BIN)/python -m tools.artefact

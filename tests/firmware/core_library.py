@@ -100,10 +100,17 @@ def declarations() -> str:
     return subprocess.run(command, check=True, input=text, capture_output=True, text=True).stdout
 
 
-def load(library: Path) -> tuple[FFI, Any]:
-    """Load a library; its structures are as large here as they are there."""
+@functools.cache
+def interface() -> FFI:
+    """Return what Python knows of the declarations; to read them takes longer than to load a library."""
     ffi = FFI()
     ffi.cdef(declarations())
+    return ffi
+
+
+def load(library: Path) -> tuple[FFI, Any]:
+    """Load a library; its structures are as large here as they are there."""
+    ffi = interface()
     lib: Any = ffi.dlopen(str(library))
     assert lib.check_device_size() == ffi.sizeof("struct dcmp_device")
     return ffi, lib

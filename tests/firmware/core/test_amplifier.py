@@ -60,6 +60,14 @@ def test_a_cut_knows_no_slew_and_is_forgotten(core: Core) -> None:
     assert bench.tick() == (100, True)
 
 
+@pytest.mark.parametrize("state", [1, 2, 4])
+def test_outside_run_no_command_is_applied_whoever_left_it(core: Core, state: int) -> None:
+    bench = Bench(core)
+    bench.go_to(state)
+    bench.device.amplifier.target_mV = 9000
+    assert bench.tick() == (0, False)
+
+
 def test_nothing_lingers_from_before_run(core: Core) -> None:
     """A voltage asked for in IDLE is not what RUN begins with."""
     bench = Bench(core)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from fastcrc import crc16
 
 from dcmp_hil.values import Fault
 from tests.firmware.bench import SESSION, Core, cobs_wire, decode, encode, slcan_wire, unstuff
@@ -136,6 +137,21 @@ def test_log_begins_anew_after_power_on(core: Core, fill: int) -> None:
     assert Board(core, log=log).logged() == []
 
 
+def test_log_that_was_damaged_begins_anew(core: Core) -> None:
+    log = core.new("struct fault_log *")
+    memory = core.ffi.buffer(log)
+    core.lib.fault_log_open(log)
+    assert log.crc == 0x10600000 | crc16.ibm_3740(bytes(memory)[:-4])
+    core.lib.fault_log_add(log, core.new("struct fault_log_entry *", (1, 2, 3, 4)))
+    core.lib.fault_log_open(log)
+    assert core.lib.fault_log_look(log, 0).detail == 4
+    for bit in range(8 * len(memory)):
+        damaged = core.new("struct fault_log *", log[0])
+        core.ffi.buffer(damaged)[bit // 8] = bytes([memory[bit // 8][0] ^ 1 << bit % 8])
+        core.lib.fault_log_open(damaged)
+        assert core.lib.fault_log_look(damaged, 0) == core.ffi.NULL
+
+
 def test_log_keeps_the_newest_eight(core: Core) -> None:
     log = core.new("struct fault_log *")
     core.lib.fault_log_open(log)
@@ -182,6 +198,60 @@ def test_health_counts_what_the_board_saw(core: Core) -> None:
     assert not board.app.lost
 
 
+def test_lost_bytes_are_counted_once(core: Core) -> None:
+    board = Board(core)
+    for lost, counted in [(False, 0), (True, 1), (False, 1)]:
+        board.app.lost = lost
+        board.tick()
+        board.said()
+        assert board.app.device.health.report.ring_overruns == counted
+
+
+def test_app_says_that_it_lives(core: Core) -> None:
+    board = Board(core)
+    for round_ in range(1, 4):
+        board.tick()
+        assert board.app.life.decisions == board.app.device.tick == round_ - 1
+        board.hear(b"")
+        assert board.app.life.receptions == round_
+
+
+def test_answers_leave_at_once(core: Core) -> None:
+    board = Board(core)
+    assert core.lib.ring_is_empty(core_ring(board.app.sending, core))
+    board.say("PARAMETER_GET", id=1)
+    assert not core.lib.ring_is_empty(core_ring(board.app.sending, core))
+
+
+def test_chunk_that_is_full_is_looked_at_to_its_end_and_no_further(core: Core) -> None:
+    board = Board(core)
+    board.hear(b"\x01\0" * 32 + b"\x01")
+    assert board.app.frames == 32
+    board.hear(b"\0")
+    assert board.app.frames == 33
+
+
+@pytest.mark.parametrize("room", [1024, 30, 1])
+def test_what_has_no_room_waits(core: Core, room: int) -> None:
+    """Sixteen answers in slcan are more than is put out at a time."""
+    board = Board(core, slcan=True)
+    board.hear(b"O\r")
+    board.said()
+    sending = core_ring(board.app.sending, core)
+    assert core.lib.ring_put(sending, b"x" * 1024, 1024)
+    asked = [*range(1, 15), 1, 2]
+    for number in asked:
+        board.say("PARAMETER_GET", id=number)
+    out = core.new("uint8_t[]", 1024)
+    core.lib.ring_take(sending, out, room)
+    core.lib.app_say(board.app)
+    core.lib.ring_take(sending, out, 1024 - room)
+    said = b"".join(board.said() for _ in range(6))
+    frames = [frame.decode() for frame in said.split(b"\r") if frame]
+    answers = [decode(int(frame[1:4], 16), bytes.fromhex(frame[5:])) for frame in frames]
+    assert [fields["id"] for _, fields in answers] == asked
+
+
 def test_answers_without_room_are_counted(core: Core) -> None:
     board = Board(core, slcan=True)
     assert board.lib.ring_put(core_ring(board.app.sending, core), b"x" * 1024, 1024)
@@ -192,7 +262,7 @@ def test_answers_without_room_are_counted(core: Core) -> None:
 def test_watchdog_is_fed_only_while_all_go_on(core: Core) -> None:
     life, seen = core.new("struct life *"), core.new("struct life *")
     assert not core.lib.life_goes_on(life, seen)
-    for stuck in ("ticks", "receptions", "decisions"):
+    for stuck in ("ticks", "receptions", "decisions") * 2:
         for part in ("ticks", "receptions", "decisions"):
             setattr(life, part, getattr(life, part) + (part != stuck))
         assert not core.lib.life_goes_on(life, seen), stuck

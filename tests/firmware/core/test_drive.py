@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.firmware.bench import Bench, Core
+from tests.firmware.bench import SESSION, Bench, Core, encode
 
 RUN, FAULT = 3, 4
 
@@ -102,6 +102,20 @@ def test_only_the_owners(core: Core) -> None:
     assert bench.drive()
 
 
+def test_a_stop_is_no_drive_whatever_lies_behind_it(core: Core) -> None:
+    """A controller's buffer may hold the rest of a longer frame."""
+    bench = Bench(core)
+    bench.run()
+    number, stop = encode("STOP", reason=3)
+    newest = {"seq": bench.device.tick, "session": SESSION, "ttl_ms": 50}
+    _, drive = encode("DRIVE", voltage_mV=0, arm=1, clear=0, release=0, **newest)
+    frame = core.frame(number, stop + drive[2:])
+    frame.length = len(stop)
+    core.lib.dcmp_device_receive(bench.device, frame, bench.now)
+    assert bench.state == FAULT
+    assert not bench.device.driven
+
+
 def test_before_the_first_sample_there_is_nothing_to_answer(core: Core) -> None:
     bench = Bench(core, boot=False)
     bench.hello()
@@ -157,6 +171,15 @@ def test_missed(core: Core) -> None:
     bench.tick(3)
     assert bench.sample["missed"] == 1
     assert bench.device.health.report.sequence_gaps == gaps + 3
+
+
+def test_missed_while_arming(core: Core) -> None:
+    bench = Bench(core)
+    bench.go_to(2)
+    gaps = bench.device.health.report.sequence_gaps
+    bench.tick(2)
+    assert bench.state == 2
+    assert bench.device.health.report.sequence_gaps == gaps + 2
 
 
 @pytest.mark.parametrize("around", [256, 8192, 1 << 31])

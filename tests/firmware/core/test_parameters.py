@@ -93,6 +93,20 @@ def test_the_first_reason_is_answered(core: Core) -> None:
     assert _set(bench, 9, 30, session=9) == (NOT_IDLE, 20)
 
 
+def test_a_new_owner_finds_the_board_as_it_was_built(core: Core) -> None:
+    bench = Bench(core, slew_mV_per_ms=200)
+    bench.hello()
+    for number, (low, _) in RANGES.items():
+        assert _set(bench, number, max(low, 1)) == (OK, max(low, 1))
+    bench.tick(5)
+    bench.hello()
+    assert bench.ask("PARAMETER_GET", id=7)["value"] == 1  # the same one
+    bench.drive(arm=0, release=1)
+    bench.hello(9)
+    for number, value in {**BUILT, 4: bench.device.tick, 8: 200}.items():
+        assert bench.ask("PARAMETER_GET", id=number)["value"] == value
+
+
 def test_lowered_limits_hold(core: Core) -> None:
     bench = Bench(core)
     bench.hello()
@@ -136,6 +150,7 @@ def test_a_configuration_outside_its_ranges(core: Core, field: str) -> None:
         bench.send("HELLO", session=1, protocol_hash=core.lib.check_protocol_hash())
         bench.send("STOP", reason=0)
         bench.corrupt(20)
+        assert bench.device.health.report.crc_errors == 0
         core.lib.dcmp_device_link(bench.device, False, 0)
         core.lib.dcmp_device_link(bench.device, True, 0)
         for _ in range(200):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from fastcrc import crc16
 
 from tests.firmware.bench import CONFIG, Core
 from tools.record import RECORD_BYTES, RecordLink, record
@@ -111,3 +112,24 @@ def test_full_flash_of_the_board_holds_so_many(core: Core) -> None:
     assert 16 * 1024 // RECORD_BYTES == PLACES
     sectors = [[numbered(n) for n in range(1, PLACES + 1)], [BLANK] * PLACES]
     assert Store(core, *sectors).next() == (1, 0, True)
+
+
+def test_magic_is_looked_at_too(core: Core) -> None:
+    body = b"\0" + numbered(1)[1:-4]
+    other = body + crc16.ibm_3740(body).to_bytes(4, "little")
+    assert Store(core, [other], []).newest() == core.ffi.NULL
+
+
+@pytest.mark.parametrize("word", range(RECORD_BYTES // 4))
+def test_one_word_makes_a_place_used(core: Core, word: int) -> None:
+    torn = BLANK[: 4 * word] + bytes(4) + BLANK[4 * word + 4 :]
+    assert Store(core, [numbered(1), torn, BLANK], []).next() == (0, 2, False)
+
+
+def test_place_behind_a_sector_is_not_in_it(core: Core) -> None:
+    """Sectors in any order in memory, one right behind the other."""
+    memory = core.new("struct record[]", 4)
+    core.ffi.buffer(memory)[:] = BLANK * 2 + numbered(1) + BLANK
+    sectors = core.new("struct record *[]", [memory + 2, memory])
+    place = core.lib.record_next(sectors, 2, core.lib.record_newest(sectors, 2))
+    assert (place.sector, place.index, place.blank_first) == (0, 1, False)

@@ -108,3 +108,19 @@ def test_a_new_owner_finds_the_fault_as_it_was(core: Core) -> None:
     bench.tick()
     assert bench.fault == (3, 2)
     assert bench.sample["state"] == FAULT
+
+
+def test_nobody_has_no_lease_and_asks_for_none(core: Core) -> None:
+    session = core.new("struct dcmp_session *")
+    for owner in (0, 1, 0xFFFF):
+        session.owner = owner
+        assert core.lib.dcmp_session_lapsed(session, LEASE) is (owner != 0)
+        session.owner = 0
+        assert core.lib.dcmp_session_ask(session, owner, 0) is (owner != 0)
+
+
+def test_a_new_owner_inherits_nothing(core: Core) -> None:
+    session = core.new("struct dcmp_session *", (0, 5, True, 6, 7))
+    assert core.lib.dcmp_session_ask(session, 9, 77)
+    assert (session.owner, session.heard_us, session.has_predecessor) == (9, 77, False)
+    assert (session.seq, session.step) == (0, 0)
