@@ -61,6 +61,8 @@ def assemble(
         recent=max(1, round(rig.loop.rate_hz)),
         in_line=in_line,
         apart=apart,
+        model=rig.model.values(),
+        backend=backend,
     )
     measured = rig.controller.position == "measured"
     supervisor = make_supervisor(rig, recorder.event)

@@ -34,3 +34,6 @@ class Model(NamedTuple):
     def external(self, t: float) -> float:
         """Return eta/J at time `t`, rad/s2."""
         return self.eta + self.eta_amplitude * math.sin(self.eta_rate * t)
+
+
+UNKNOWN_MODEL = Model(*[math.nan] * len(Model._fields))

@@ -135,7 +135,8 @@ class Session:
             here = [self._figures, *here]
         else:
             here, sentences, there = sorted_out(sinks)
-            self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn)
+            model = rig.model.values()
+            self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn, model=model)
         self._line, self._recorder = assemble(rig, clock, here, in_line=fast, apart=self._apart)
         for sentence in sentences:
             self._recorder.event(Event(0.0, "WARN", sentence))

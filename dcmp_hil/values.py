@@ -78,7 +78,7 @@ class Event(NamedTuple):
     """Something worth a line of text."""
 
     t: float  # s, device time
-    level: Literal["INFO", "WARN", "ERROR", "PHASE"]  # PHASE: the text is the name of a new phase
+    level: Literal["INFO", "WARN", "ERROR", "PHASE", "LINK"]  # PHASE, LINK: the text is a phase, counters
     text: str
 
 

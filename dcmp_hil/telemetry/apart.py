@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.audience import Audience
 from dcmp_hil.telemetry.child import DONE, FIGURES, MESSAGE, UP, Setup, State
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
@@ -30,6 +31,7 @@ from dcmp_hil.values import Event
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from dcmp_hil.model import Model
     from dcmp_hil.telemetry.statistics import Statistics
 
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
@@ -61,6 +63,8 @@ class Apart:
         Functions that make the other sinks there, pickled.
     warn
         Told, in a sentence, what the run goes on without.
+    model
+        What the host believes of the plant.
 
     Attributes
     ----------
@@ -81,6 +85,7 @@ class Apart:
         keep: bool,
         sinks: Sequence[bytes] = (),
         warn: Callable[[str], None] | None = None,
+        model: Model = UNKNOWN_MODEL,
     ) -> None:
         self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
         ring, ledger, self._setup, *kept = self._files
@@ -96,7 +101,8 @@ class Apart:
         self.figures = Figures(statistics, SharedKeeper(self._kept) if self._kept else None)
         self.dropped = 0
         self.pid: int | None = None
-        setup = Setup(_CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks))
+        setup = Setup(_CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model)
+        self._model = model
         os.write(self._setup, pickle.dumps(setup))
 
     def open(self) -> None:
@@ -201,7 +207,7 @@ class Apart:
         self.figures.troubles += state.troubles
         ring = Ring(self.ring.capacity, self.ring.memory)
         ring.position, ring.dropped = state.position, state.dropped
-        audience = Audience(ring, [self.figures])
+        audience = Audience(ring, [self.figures], model=self._model)
         missing = min(self._events - state.events, len(self._told))
         for event in list(self._told)[len(self._told) - missing :]:
             audience.event(event)

@@ -6,12 +6,14 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from dcmp_hil.model import Model
     from dcmp_hil.telemetry.ring import Ring
 
 INTERVAL = 0.1  # s between two blocks in real time
@@ -46,12 +48,19 @@ class Audience:
         Who looks on.
     tell
         Takes the event that a sink gave up; None hands it to the other sinks.
+    model
+        What the host believes of the plant.
     """
 
     def __init__(
-        self, ring: Ring, sinks: Sequence[Sink], tell: Callable[[Event], None] | None = None
+        self,
+        ring: Ring,
+        sinks: Sequence[Sink],
+        tell: Callable[[Event], None] | None = None,
+        model: Model = UNKNOWN_MODEL,
     ) -> None:
         self.ring = ring
+        self._model = model
         self._sinks = list(sinks)
         self._events: deque[Event] = deque(maxlen=_WAITING)
         self._report = tell or self._events.append
@@ -66,7 +75,7 @@ class Audience:
         self._hand_on_events()
         rows = self.ring.drain()
         if len(rows):
-            block = Block(rows)
+            block = Block(rows, self._model)
             self._tell(lambda sink: sink.block(block))
         self._report_warnings()
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.ring import FIELDS, NOWHERE
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dcmp_hil.model import Model
     from dcmp_hil.values import Reference
 
 _COLUMN = {name: index for index, name in enumerate(FIELDS)}
@@ -28,10 +30,12 @@ class Block:
     ----------
     rows
         Shape (n, len(FIELDS)), as `Ring.drain` gives them.
+    model
+        What the host believes of the plant.
     """
 
-    def __init__(self, rows: NDArray[np.float64]) -> None:
-        self.rows = rows
+    def __init__(self, rows: NDArray[np.float64], model: Model = UNKNOWN_MODEL) -> None:
+        self.rows, self.model = rows, model
 
     def __len__(self) -> int:
         """Count the periods."""
@@ -46,6 +50,18 @@ class Block:
     def reference(self) -> NDArray[np.float64]:
         """Position rad, velocity rad/s and acceleration rad/s2 at each row's own `t`, shape (n, 3)."""
         return self.rows[:, _REFERENCE]
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Return what of the disturbance is gravity by the model, -(gmL/J) sin x1_hat, rad/s2, shape (n,)."""
+        gravity: NDArray[np.float64] = -self.model.gravity * np.sin(self["position_estimate"])
+        return gravity
+
+    @property
+    def friction(self) -> NDArray[np.float64]:
+        """Return what of it is Coulomb friction by the model, -f1 sgn x2_hat, rad/s2, shape (n,)."""
+        friction: NDArray[np.float64] = -self.model.f1 * np.sign(self["velocity_estimate"])
+        return friction
 
     @property
     def tracking_error(self) -> NDArray[np.float64]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import rerun as rr
 import rerun.blueprint as rrb
 
+from dcmp_hil.telemetry import portrait
+from dcmp_hil.telemetry.scenery import LINK
 from dcmp_hil.telemetry.titles import title
 
 if TYPE_CHECKING:
@@ -19,13 +21,15 @@ _BEYOND_LIMIT = 1.3  # so that the lines of the limit show
 
 def dashboard(rig: RigView) -> rrb.Blueprint:
     """Lay out the run of a rig: the arm, what it does, what is asked of the motor, and how the loop fares."""
-    left = rrb.Vertical(_pendulum(rig), _parameters(), row_shares=[42, 58])
+    left = rrb.Vertical(_pendulum(rig), _portrait(), _parameters(), row_shares=[36, 32, 32])
     joint = rrb.Vertical(
         plot("joint/position_rad"), plot("joint/velocity_rad_s"), plot("joint/disturbance_rad_s2")
     )
     timing = rrb.Horizontal(_timing(), _histograms(), column_shares=[56, 44])
     control = rrb.Vertical(plot("control/tracking_error_mrad", legend=False), _voltage(rig), timing)
     states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
+    if rig.wired:
+        states = rrb.Horizontal(_states(), _link(), _events(), column_shares=[36, 24, 40])
     right = rrb.Vertical(rrb.Horizontal(joint, control), states, row_shares=[80, 20])
     return opened(rrb.Horizontal(left, right, column_shares=[24, 76]))
 
@@ -108,8 +112,25 @@ def _pendulum(rig: RigView) -> rrb.Spatial3DView:
     )
 
 
-def _parameters() -> rrb.TextDocumentView:
-    return rrb.TextDocumentView(origin="params", name="Parameters")
+def _portrait() -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(
+        origin=portrait.PATH,
+        name="Phase portrait",
+        background=rrb.Background(color=(15, 17, 20)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-1.5, 1.5), y_range=(-1.45, 1.45)),
+    )
+
+
+def _link() -> rrb.TimeSeriesView:
+    return plot(LINK, window=None, name="Link: lost, damaged", legend=False)
+
+
+def _parameters() -> rrb.Tabs:
+    return rrb.Tabs(
+        rrb.TextDocumentView(origin="params", name="Parameters"),
+        rrb.TextDocumentView(origin="about", name="Versions and host"),
+        active_tab=0,
+    )
 
 
 def _histograms() -> rrb.Tabs:

@@ -27,6 +27,7 @@ from dcmp_hil.telemetry.shared import Ledger, mapped
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
+    from dcmp_hil.model import Model
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.statistics import Statistics
 
@@ -50,6 +51,8 @@ class Setup:
         Not begun.
     sinks
         Functions that make the others, pickled.
+    model
+        What the host believes of the plant.
     """
 
     capacity: int
@@ -58,6 +61,7 @@ class Setup:
     kept: tuple[int, int] | None
     statistics: Statistics
     sinks: tuple[bytes, ...]
+    model: Model
 
 
 class State(NamedTuple):
@@ -92,7 +96,7 @@ class _Watcher:
         self._keeper = SharedKeeper(setup.kept) if setup.kept else None
         self._figures = Figures(setup.statistics, self._keeper)
         self._ring = Ring(setup.capacity, mapped(setup.ring, size_of(setup.capacity)))
-        self._audience = Audience(self._ring, [self._figures], self._tell)
+        self._audience = Audience(self._ring, [self._figures], self._tell, setup.model)
         self._ledger = Ledger(setup.ledger)
         self._services: list[Service] = []
         self._taken = 0  # events from the parent
@@ -132,7 +136,7 @@ class _Watcher:
                 continue
             warnings += getattr(sink, "warnings", ())
             ring = Ring(self._ring.capacity, self._ring.memory)
-            self._services.append(Service(Audience(ring, [sink], self._tell)))
+            self._services.append(Service(Audience(ring, [sink], self._tell, self._setup.model)))
         return warnings
 
     def _tell(self, event: Event) -> None:

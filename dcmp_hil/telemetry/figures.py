@@ -52,7 +52,7 @@ class Figures:
         """Take an event; the first warnings and errors are kept in any case."""
         if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
             self.troubles.append(f"{event.t:.3f} s: {event.text[:_LONGEST]}")
-        if self.keeper:
+        if self.keeper and event.level != "LINK":  # what they came to is in the result
             self.keeper.event(event)
 
     def close(self) -> None:

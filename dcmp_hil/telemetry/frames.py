@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
+from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.histogram import Histogram
 from dcmp_hil.telemetry.lanes import Lane
-from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, lane_path, turned
+from dcmp_hil.telemetry.link import counters
+from dcmp_hil.telemetry.portrait import Portrait
+from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
 from dcmp_hil.telemetry.signals import by_plot
 
 if TYPE_CHECKING:
@@ -51,13 +54,17 @@ class Frames:
         }
         self._lanes = {name: Lane() for name in ("voltage", "samples")}
         self._last_slot = -1
+        self._portrait = Portrait()
+        self._bucket = rows_per_bucket(rig.period)
 
     def choose_lines(self, block: Block) -> None:
-        """Leave out the truth where nobody knows it, before the first line is drawn."""
+        """Leave out the truth, or the model's share, where it is unknown, before the first line is drawn."""
         # By the position: even a simulation knows no disturbance before its first step.
-        known = not np.isnan(block["position_true"]).all()
+        unknown = {"_true_"} if np.isnan(block["position_true"]).all() else set()
+        if np.isnan(block.gravity).all():
+            unknown |= {"gravity_", "friction_", "unexplained_"}
         for plot, signals in by_plot().items():
-            drawn = [signal for signal in signals if known or "_true_" not in signal.column]
+            drawn = [signal for signal in signals if not any(part in signal.column for part in unknown)]
             if drawn:
                 self.plots[plot] = drawn
 
@@ -67,20 +74,32 @@ class Frames:
         for field, histogram in self._histograms.items():
             if histogram.add(block["t"], block[field]):
                 calls.append(self._bars(field, block["t"][-1:]))
-        return calls
+        return calls + self._phase(block)
 
     def of_event(self, event: Event) -> Call:
         """Return the call for an event."""
         t = np.array([event.t])
         if event.level == "PHASE":
             return self._state("phase", t, [event.text])
+        if event.level == "LINK":
+            counts = np.array([list(counters(event.text).values())])
+            return LINK, self._times(t), rr.Scalars.columns(scalars=counts)
         return "events/log", self._times(t), rr.TextLog.columns(text=[event.text], level=[event.level])
 
     def _lines(self, block: Block) -> Iterator[Call]:
-        times = self._times(block["t"])
         for plot, signals in self.plots.items():
             values = np.stack([signal.read(block) for signal in signals], axis=1)
-            yield plot, times, rr.Scalars.columns(scalars=values)
+            t, drawn = peaks(block["t"], values, self._bucket)
+            yield plot, self._times(t), rr.Scalars.columns(scalars=drawn)
+
+    def _phase(self, block: Block) -> list[Call]:
+        self._portrait.add(block)
+        found = self._portrait.draw()
+        if found is None:
+            return []
+        t, calls = found
+        times = self._times(np.array([t]))
+        return [(entity, times, columns) for entity, columns in calls]
 
     def _slow(self, block: Block) -> Iterator[Call]:
         """Yield what 50 points a second are enough for: the pendulum, and the lines of the limit."""

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
+from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.audience import Audience, Service, Sink
+from dcmp_hil.telemetry.link import LinkWatch
 from dcmp_hil.telemetry.ring import Ring
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from dcmp_hil.model import Model
     from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.block import Aligner
     from dcmp_hil.values import Cycle, Event, Truth
@@ -41,6 +44,10 @@ class Recorder:
         sinks, no thread.
     apart
         Who looks on from a process of its own.
+    model
+        What the host believes of the plant.
+    backend
+        Whose counters are told of once a second, if it has a wire.
     """
 
     def __init__(
@@ -52,6 +59,8 @@ class Recorder:
         recent: int,
         in_line: bool,
         apart: Apart | None = None,
+        model: Model = UNKNOWN_MODEL,
+        backend: object = None,
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self._apart = apart
@@ -59,7 +68,8 @@ class Recorder:
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now
-        self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event)
+        self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model)
+        self._look_at_link = LinkWatch(backend, recent, self.event).look
         self._untold = 0
         self._in_line = in_line
         self._service = Service(self._audience) if sinks and not in_line else None
@@ -70,6 +80,7 @@ class Recorder:
         now, began = self._now(cycle.sample.t, cycle.reference)
         self._push(cycle, self._truth(), now, began)
         self.recent.append(cycle)
+        self._look_at_link(cycle.sample.t)
         if self._in_line:
             self._untold += 1
             if self._untold == _IN_LINE:

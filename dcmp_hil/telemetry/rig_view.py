@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.explain import explain, simulated
+from dcmp_hil.host import host_facts
+from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
+    from dcmp_hil.model import Model
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,12 @@ class RigView:
         The rig is a simulation, so what is shown as moving is the truth.
     period
         s, nominal.
+    model
+        What the host believes of the plant.
+    wired
+        Whether there is a wire, with counters.
+    about
+        Rows of the table of versions and of the computer.
     """
 
     name: str
@@ -35,6 +46,9 @@ class RigView:
     voltage_limit: float | None
     simulated: bool
     period: float
+    model: Model = UNKNOWN_MODEL
+    wired: bool = False
+    about: tuple[tuple[str, str], ...] = ()
 
 
 _FIRST = ("controller", "observer", "reference", "loop")  # what is tuned stands where nobody need scroll
@@ -50,6 +64,22 @@ def view_of(rig: Rig) -> RigView:
         voltage_limit=limit if math.isfinite(limit) else None,
         simulated=simulated(rig),
         period=rig.period,
+        model=rig.model.values(),
+        wired=rig.backend.kind != "sim",
+        about=_about(),
+    )
+
+
+def _about() -> tuple[tuple[str, str], ...]:
+    """Return versions, and what is known of the computer."""
+    packages = [(name, version(name)) for name in ("dcmp-hil", "rerun-sdk", "numpy")]
+    facts = host_facts()
+    privileges = facts.pop("privileges")
+    rows = {**facts, **privileges}
+    return (
+        *packages,
+        ("protocol", f"{PROTOCOL_HASH:08x}"),
+        *((name, "unknown" if fact is None else str(fact)) for name, fact in rows.items()),
     )
 
 

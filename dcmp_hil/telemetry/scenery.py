@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
+from dcmp_hil.telemetry.link import DEVICE, HOST
 from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.signals import Signal
 
 ARM, GHOST = "rig/arm", "rig/reference"
-LIMITS = "control/voltage_V/limit"
+LIMITS, LINK = "control/voltage_V/limit", "link/counters"
 HISTOGRAMS = {
     "period": ("loop/period_hist", 0.5, 1.5, TIMING),
     "lateness": ("loop/lateness_hist", 0.0, 0.5, ERROR),
@@ -56,6 +57,10 @@ def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
     if rig.voltage_limit is not None:
         style = rr.SeriesLines(names=["limit", "limit"], colors=[(130, 60, 60)] * 2, widths=[1.0] * 2)
         stream.log(LIMITS, style, static=True)
+    if rig.wired:
+        names = [*(f"host: {name}" for name in HOST), *(f"device: {name}" for name in DEVICE)]
+        style = rr.SeriesLines(names=[name.replace("_", " ") for name in names], widths=[1.6] * len(names))
+        stream.log(LINK, style, static=True)
     for lane, states in LANES.items():
         look = rr.StateConfiguration(values=list(states), colors=list(states.values()))
         stream.log(lane_path(lane), look, static=True)
@@ -94,9 +99,13 @@ def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _log_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
-    rows = [f"| {name} | {value} |" for name, value in rig.parameters]
-    text = "\n".join([f"| {rig.name} | |", "|:--|:--|", *rows])
-    stream.log("params", rr.TextDocument(text, media_type="text/markdown"), static=True)
+    for entity, head, rows in (
+        ("params", rig.name, rig.parameters),
+        ("about", "versions and host", rig.about),
+    ):
+        lines = [f"| {name} | {value} |" for name, value in rows]
+        text = "\n".join([f"| {head} | |", "|:--|:--|", *lines])
+        stream.log(entity, rr.TextDocument(text, media_type="text/markdown"), static=True)
 
 
 def _circle(radius: float, z: float) -> NDArray[np.float64]:

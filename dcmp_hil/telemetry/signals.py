@@ -21,6 +21,9 @@ VOLTAGE = (70, 150, 245)  # blue
 DEMAND = (150, 190, 240)  # pale blue
 TIMING = (190, 90, 200)  # purple
 FAINT = (150, 150, 150)
+GRAVITY = (95, 190, 200)  # teal
+FRICTION = (200, 140, 225)  # lilac
+REST = (225, 205, 95)  # yellow
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,15 @@ SIGNALS = (
         "estimate",
         ESTIMATE,
         lambda b: b["disturbance_estimate"],
+    ),
+    Signal("gravity_rad_s2", "joint/disturbance_rad_s2", "gravity (model)", GRAVITY, lambda b: b.gravity),
+    Signal("friction_rad_s2", "joint/disturbance_rad_s2", "friction (model)", FRICTION, lambda b: b.friction),
+    Signal(
+        "unexplained_rad_s2",
+        "joint/disturbance_rad_s2",
+        "rest",
+        REST,
+        lambda b: b["disturbance_estimate"] - b.gravity - b.friction,
     ),
     Signal(
         "tracking_error_mrad",

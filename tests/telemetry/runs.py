@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.model import Model
 from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.rig_view import RigView
@@ -72,7 +73,7 @@ def blocks(periods: int, *, known: bool = True, rows: int = 100) -> list[Block]:
         now, began = aligner.now(cycle(k).sample.t, cycle(k).reference)
         ring.push(cycle(k), truth(k) if known else UNKNOWN_TRUTH, now, began)
         if len(ring) == rows or k == periods - 1:
-            made.append(Block(ring.drain()))
+            made.append(Block(ring.drain(), Model()))
     return made
 
 
