@@ -19,6 +19,7 @@ from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
+from dcmp_hil.cli.view import view
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.telemetry.outlet import THREAD
 
@@ -29,7 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, check, paper, replay, device, rigs, ports, monitor):
+for command in (run, check, paper, replay, device, rigs, ports, monitor, view):
     app.command()(command)
 
 

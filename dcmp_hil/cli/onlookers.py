@@ -23,8 +23,8 @@ def status_line(period: float) -> Sink:
     return StatusLine(console.err, period)
 
 
-def dashboard(view: RigView, record: Path | None, viewer: Viewer) -> Sink:
+def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:
     """Return the Rerun dashboard, its recording, or both."""
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
 
-    return RerunSink(rig=view, record=record, viewer=viewer)
+    return RerunSink(rig=view, record=record, viewer=viewer, port=port)

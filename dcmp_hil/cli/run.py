@@ -15,6 +15,8 @@ class Viewer(StrEnum):
     """What shows the run."""
 
     SPAWN = "spawn"
+    WEB = "web"
+    SERVE = "serve"
     CONNECT = "connect"
     NONE = "none"
 
@@ -34,7 +36,8 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     viewer: Annotated[
         Viewer | None,
         typer.Option(
-            help="Start a viewer, connect to a running one, or none. By default: one if there is a display"
+            help="A window, a page in a browser, a server for viewers that come and go (dcmp-hil view), the "
+            "viewer that runs already, or none. By default a window if there is a display."
         ),
     ] = None,
     record: Annotated[

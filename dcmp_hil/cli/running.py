@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import signal
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.onlookers import dashboard, status_line
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
+from dcmp_hil.cli.watching import watched
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.rerun_sink import Viewer
 
 _FAULTS, _WIRED = "sim_backend.faults:with_faults", "sim_backend.faults:needs_wire"
 _BOARD = "backend.kind=sim-board"
@@ -37,12 +39,13 @@ class Options:
     duration: float | None
     window_from: float
     fast: bool
-    viewer: Literal["spawn", "connect", "none"] | None
+    viewer: Viewer | None
     record: Path | None
     keep: bool
     json_file: str | None
     note: str
     faults: tuple[str, ...] = ()
+    port: int = 0  # of the recording's own server
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
@@ -52,8 +55,9 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
         console.warn(sentence)
     if options.faults:
         rig = _with_faults(rig, rig_name, overrides, options.faults)
-    with StopRequest() as stop:  # from here on: opening a viewer takes its time, too
-        return _run(rig, options, stop)
+    # From here on stops are heard: opening a viewer takes its time, too.
+    with StopRequest() as stop, watched(_viewer(options)) as (viewer, port):
+        return _run(rig, replace(options, viewer=viewer, port=port), stop)
 
 
 def _with_faults(rig: Rig, rig_name: str, overrides: Sequence[str], faults: tuple[str, ...]) -> Rig:
@@ -104,11 +108,11 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     if record is not None or viewer != "none":
         from dcmp_hil.telemetry.rig_view import view_of
 
-        makers.append(partial(dashboard, view_of(rig), record, viewer))
+        makers.append(partial(dashboard, view_of(rig), record, viewer, options.port))
     return makers
 
 
-def _viewer(options: Options) -> Literal["spawn", "connect", "none"]:
+def _viewer(options: Options) -> Viewer:
     if options.viewer is not None:
         return options.viewer
     from dcmp_hil.telemetry.display import display_available

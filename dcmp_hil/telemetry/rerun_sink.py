@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.rig_view import RigView
     from dcmp_hil.telemetry.signals import Signal
 
-    Viewer = Literal["spawn", "connect", "none"]
+    Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
 _PROBE = 0.4  # s
 _SERVER_START = 3.0  # s
@@ -59,11 +59,12 @@ class RerunSink:
     record
         The .rrd file; None for none.
     viewer
-        ``spawn`` opens a window, ``connect`` sends to the viewer that listens on 127.0.0.1:9876.
+        ``spawn`` opens a window; ``serve`` waits for viewers that come and go, and so does ``web``, whose
+        pages somebody else serves; ``connect`` sends to the viewer that listens on 127.0.0.1:9876.
     application
         Recordings of the same application share the viewer's layout.
     port
-        First port tried for the recording's own server, on 127.0.0.1 only (``spawn``).
+        First port tried for the recording's own server, on 127.0.0.1 only (``spawn``, ``serve``, ``web``).
 
     Attributes
     ----------
@@ -102,6 +103,8 @@ class RerunSink:
             self._connect()
         elif viewer == "spawn":
             self._spawn(port)
+        elif viewer != "none":
+            self._serve(port)
         atexit.register(self.close)
 
     def block(self, block: Block) -> None:
@@ -191,15 +194,21 @@ class RerunSink:
                 "look at the recording afterwards, or use --viewer none."
             )
             return
+        outlet = self._serve(first_port)
+        if outlet is not None and self.port is not None:
+            self._open_window(outlet, self.port)
+
+    def _serve(self, first_port: int) -> Outlet | None:
+        """Let viewers come and go; who comes late gets what there was."""
         self.port = window.free_port(first_port)
         if self.port is None:
             self.warnings.append(
                 f"No port from {first_port} on is free on 127.0.0.1, so no viewer was opened; "
                 "close viewers that are no longer needed."
             )
-            return
+            return None
         target = rr.GrpcServerSink(window.LOOPBACK, self.port, server_memory_limit="256MiB")
-        self._open_window(self._open_viewer(target, _CLOSING), self.port)
+        return self._open_viewer(target, _CLOSING)
 
     def _open_window(self, outlet: Outlet, port: int) -> None:
         """Open it on what is known before the first period."""

@@ -7,12 +7,14 @@ import socket
 import subprocess
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import quote
 
 from dcmp_hil.clock import MonotonicClock, pause
 
 LOOPBACK = "127.0.0.1"
-PORT = 9876
+PORT, WEB_PORT = 9876, 9090
 _PORTS_TRIED = 50
+_SERVES = 0.4  # s; where nobody listens the answer is there at once
 _LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
@@ -98,6 +100,35 @@ def start_viewer(port: int) -> subprocess.Popen[bytes]:
         env=viewer_environment(),
         start_new_session=True,  # Ctrl-C ends the run, not the window
     )
+
+
+def web_url(web_port: int, port: int) -> str:
+    """Return the page on which the web viewer shows what is served on `port`."""
+    return f"http://{LOOPBACK}:{web_port}?url={quote(proxy_url(port), safe='')}"
+
+
+def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
+    """Serve the web viewer's pages on `web_port` until the process is ended; they show what is on `port`.
+
+    Raises
+    ------
+    OSError
+        If it cannot be started.
+    """
+    options = ["--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port), proxy_url(port)]
+    return subprocess.Popen(  # noqa: S603 - the binary of our own dependency
+        [viewer_binary(), *options],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=viewer_environment(),
+        start_new_session=True,  # Ctrl-C ends the run, which ends this
+    )
+
+
+def served(first: int = PORT) -> list[int]:
+    """Return the ports on which somebody serves a recording, among those that a run would take."""
+    return [port for port in range(first, first + _PORTS_TRIED) if speaks_http2(port, _SERVES)]
 
 
 def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:

@@ -1,0 +1,56 @@
+"""Attaching a viewer to a run that is going on."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from dcmp_hil.cli import console
+from dcmp_hil.cli.watching import web_viewer
+from dcmp_hil.clock import pause
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.display import display_available
+
+_LOOK = 0.5  # s
+
+
+def attach(port: int | None, *, web: bool) -> None:
+    """Open a viewer on what is served on `port`, or on the only port that serves something.
+
+    Raises
+    ------
+    ConfigError
+        If nothing is served there, or there are several, or there is no display for a window.
+    """
+    place = _find() if port is None else port
+    if not window.speaks_http2(place, _LOOK):
+        raise ConfigError(
+            f"Nobody serves a run on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
+        )
+    if web:
+        with web_viewer(place):
+            _until_it_ends(place)
+    elif not display_available():
+        raise ConfigError(
+            "There is no display (neither DISPLAY nor WAYLAND_DISPLAY is set) for a window. Use --web, or "
+            f"from another computer: ssh -L {place}:{window.LOOPBACK}:{place} here, then rerun --connect "
+            f"{window.proxy_url(place)} there."
+        )
+    else:
+        window.start_viewer(place)
+        console.note(f"opened {window.proxy_url(place)}; close the window when you like, the run goes on")
+
+
+def _find() -> int:
+    ports = window.served()
+    if not ports:
+        raise ConfigError("No run is served on this computer. Start one with: dcmp-hil run --viewer serve")
+    if len(ports) > 1:
+        raise ConfigError(f"Several are served: {', '.join(map(str, ports))}. Name one with --port.")
+    return ports[0]
+
+
+def _until_it_ends(port: int) -> None:
+    with suppress(KeyboardInterrupt):
+        while window.speaks_http2(port, _LOOK):
+            pause(_LOOK)
