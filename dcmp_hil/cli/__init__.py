@@ -13,6 +13,7 @@ from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.check import check
 from dcmp_hil.cli.device import device
+from dcmp_hil.cli.export import export
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
@@ -30,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, check, paper, replay, device, rigs, ports, monitor, view):
+for command in (run, check, paper, replay, export, device, rigs, ports, monitor, view):
     app.command()(command)
 
 

@@ -23,6 +23,13 @@ def status_line(period: float) -> Sink:
     return StatusLine(console.err, period)
 
 
+def recording(path: Path, period: float, run: dict[str, str], rig: str) -> Sink:
+    """Return the run's own recording."""
+    from dcmp_hil.recording.writer import Recording
+
+    return Recording(path, period, run, rig)
+
+
 def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:
     """Return the Rerun dashboard, its recording, or both."""
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second

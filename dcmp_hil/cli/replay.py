@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from dcmp_hil.cli.options import JsonFile
+from dcmp_hil.cli.options import JsonFile, Overrides
 from dcmp_hil.errors import ConfigError
 
 _COLUMNS = "Columns and units (found by name where not given)"
@@ -44,6 +44,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         Path, typer.Argument(metavar="FILE.csv", help="Recording with time, position, torque or voltage.")
     ],
     *,
+    overrides: Overrides = None,
     time: Annotated[str | None, _column("time")] = None,
     position: Annotated[str | None, _column("position")] = None,
     torque: Annotated[str | None, _column("torque")] = None,
@@ -129,6 +130,15 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     from dcmp_hil.cli.replaying import Outputs, execute
     from dcmp_hil.replay import ColumnOptions, ReplaySettings
 
+    if file.suffix == ".mcap" or file.is_dir():
+        from dcmp_hil.cli.own_recording import replay_own
+
+        replay_own(file, overrides or (), json_file)
+        return
+    if overrides:
+        raise ConfigError(
+            "--set is for recordings of dcmp-hil itself (run.mcap); here say --mu0, --f0 and so on."
+        )
     counts = _counts(counts_per_rev)
     settings = ReplaySettings(
         observer=observer if ":" in observer else observer.lower().replace("-", "_"),

@@ -55,6 +55,11 @@ class RunFolder:
         """Where the recording goes."""
         return self.path / "run.rrd"
 
+    @property
+    def own(self) -> Path:
+        """Where the run's own recording goes, with every period."""
+        return self.path / "run.mcap"
+
     def write(
         self,
         rig: Rig,

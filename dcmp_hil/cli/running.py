@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
-from dcmp_hil.cli.onlookers import dashboard, status_line
+from dcmp_hil.cli.onlookers import dashboard, recording, status_line
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.cli.watching import watched
@@ -18,6 +18,7 @@ from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import TripError
 from dcmp_hil.plugins import find_named
+from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
 
 if TYPE_CHECKING:
@@ -101,8 +102,11 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
-    """Everybody who looks on: the status line, and Rerun if there is a viewer or a recording."""
+    """Everybody who looks on: status line, the run's own recording, and Rerun with a viewer or a file."""
     makers: list[SinkMaker] = [partial(status_line, rig.period)]
+    if folder is not None:
+        run, text = about(rig, options.note, options.faults), rig_json(rig)
+        makers.append(partial(recording, folder.own, rig.period, run, text))
     record = options.record or (folder.recording if folder else None)
     viewer = _viewer(options)
     if record is not None or viewer != "none":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -52,12 +52,27 @@ def load_rig(source: str | Path, overrides: Sequence[str] = ()) -> Rig:
     text, place, folder = _read(source)
     table = parse(text, place)
     table.setdefault("name", name_from(Path(place).stem))
+    return _checked(table, place, folder, overrides)
+
+
+def load_table(table: dict[str, Any], overrides: Sequence[str] = ()) -> Rig:
+    """Check a rig that is there as a table already, as a recording has it; see `load_rig`.
+
+    Raises
+    ------
+    ConfigError
+        With every fault found.
+    """
+    return _checked(table, "the recording", None, overrides)
+
+
+def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: Sequence[str]) -> Rig:
     set_keys = apply_overrides(table, overrides)
     try:
         rig = Rig.model_validate(table)
     except ValidationError as error:
         raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
-    return _with_reference_file(rig, folder, place, set_keys)
+    return rig if folder is None else _with_reference_file(rig, folder, place, set_keys)
 
 
 def copy_rig(name: str, target: Path) -> list[Path]:

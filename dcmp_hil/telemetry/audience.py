@@ -117,16 +117,19 @@ def _warnings(sink: Sink) -> Sequence[str]:
 
 
 class Service:
-    """A thread that hands on ten times a second, until it is told to finish.
+    """A thread that hands on, ten times a second unless told otherwise, until it is to finish.
 
     Parameters
     ----------
     audience
         Nobody else tells it to hand on.
+    interval
+        s between two times.
     """
 
-    def __init__(self, audience: Audience) -> None:
+    def __init__(self, audience: Audience, interval: float = INTERVAL) -> None:
         self.audience = audience
+        self._interval = interval
         self.finishing = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="telemetry", daemon=True)
         self._thread.start()
@@ -138,6 +141,6 @@ class Service:
         return not self._thread.is_alive()
 
     def _serve(self) -> None:
-        while not self.finishing.wait(INTERVAL):
+        while not self.finishing.wait(self._interval):
             self.audience.hand_on()
         self.audience.finish()

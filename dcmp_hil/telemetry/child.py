@@ -136,7 +136,8 @@ class _Watcher:
                 continue
             warnings += getattr(sink, "warnings", ())
             ring = Ring(self._ring.capacity, self._ring.memory)
-            self._services.append(Service(Audience(ring, [sink], self._tell, self._setup.model)))
+            audience = Audience(ring, [sink], self._tell, self._setup.model)
+            self._services.append(Service(audience, getattr(sink, "interval", INTERVAL)))
         return warnings
 
     def _tell(self, event: Event) -> None:

@@ -1,0 +1,22 @@
+"""`dcmp-hil export`: a recording in other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def export(
+    file: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.mcap.")],
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Every signal, one row a period.")] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The same for pandas and others.")
+    ] = None,
+    rrd: Annotated[Path | None, typer.Option(metavar="FILE", help="The dashboard, for Rerun.")] = None,
+) -> None:
+    """Write a run's recording as CSV, Parquet, or a Rerun recording."""
+    from dcmp_hil.cli.own_recording import write_exports
+
+    write_exports(file, csv=csv, parquet=parquet, rrd=rrd)

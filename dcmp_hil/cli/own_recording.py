@@ -1,0 +1,110 @@
+"""What the command line does with a run's own recording: export it, run it again."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from dcmp_hil.cli import console
+from dcmp_hil.config import load_table
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.recording import export
+from dcmp_hil.recording.again import run_again
+from dcmp_hil.recording.compare import compare
+from dcmp_hil.recording.reader import read_run, recording_in
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.recording.compare import Comparison
+    from dcmp_hil.recording.reader import RecordedRun
+
+_MAY_CHANGE = ("observer", "controller", "model")
+
+
+def write_exports(file: Path, *, csv: Path | None, parquet: Path | None, rrd: Path | None) -> None:
+    """Write what was asked for.
+
+    Raises
+    ------
+    ConfigError
+        If nothing was, or a file would overwrite the recording.
+    """
+    targets = [(csv, export.to_csv), (parquet, export.to_parquet), (rrd, export.to_rrd)]
+    if not any(path for path, _ in targets):
+        raise ConfigError("Nothing to write: say --csv FILE, --parquet FILE or --rrd FILE.")
+    source = recording_in(file).resolve()
+    for path, _ in targets:
+        if path is not None and path.resolve() == source:
+            raise ConfigError(f"{path} is the recording itself. Write elsewhere.")
+    run = _read(file)
+    for path, write in targets:
+        if path is not None:
+            write(run, path)
+            console.note(f"wrote {path}")
+
+
+def replay_own(file: Path, overrides: Sequence[str], json_file: str | None) -> None:
+    """Run observer and controller over a recording again, and compare.
+
+    Raises
+    ------
+    ConfigError
+        If the recording cannot be read, or an override is none of observer, controller or model.
+    """
+    run = _read(file)
+    if not len(run.rows):
+        raise ConfigError(f"{run.path}: no period is in it.")
+    result = compare(run, run_again(run, _changed(run.rig, overrides)))
+    if json_file != "-":
+        console.out.print(_table(run, overrides, result))
+    if json_file is not None:
+        figures = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
+        console.write_json(json_file, {"identical": result.identical, "rows": result.rows, **figures})
+
+
+def _read(file: Path) -> RecordedRun:
+    run = read_run(file)
+    if not run.complete:
+        last = f"{run.rows[-1, 0]:.3f} s" if len(run.rows) else "its beginning"
+        console.warn(f"{run.path} was cut off: it ends at {last}, and what is there is right.")
+    return run
+
+
+def _changed(rig: Rig, overrides: Sequence[str]) -> Rig | None:
+    """Return the rig with other gains; None for the same."""
+    if not overrides:
+        return None
+    for override in overrides:
+        if override.partition(".")[0] not in _MAY_CHANGE:
+            raise ConfigError(
+                f"--set {override}: what was measured stays as it was; only keys of "
+                f"{', '.join(_MAY_CHANGE)} can be changed afterwards."
+            )
+    return load_table(
+        json.loads(json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str)), overrides
+    )
+
+
+def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Table:
+    said = "every number is the same, to the bit" if result.identical else "the numbers differ"
+    table = Table(
+        title=f"{run.path}: {result.rows} periods again: {said}",
+        title_justify="left",
+        box=None,
+        padding=(0, 2, 0, 0),
+    )
+    table.add_column("")
+    table.add_column("recorded", justify="right")
+    table.add_column(" ".join(overrides) or "again", justify="right", style="bold")
+    for line in result.figures:
+        table.add_row(line.name, _number(line.recorded), _number(line.again))
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

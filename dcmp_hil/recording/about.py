@@ -1,0 +1,62 @@
+"""What a recording says about its run, beside the rig: versions, computer, checkout."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dcmp_hil import __version__
+from dcmp_hil.clock import utc_now
+from dcmp_hil.host import host_facts
+from dcmp_hil.recording.layout import FORMAT
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.config import Rig
+
+_GIT_S = 2.0
+
+
+def about(rig: Rig, note: str = "", faults: Sequence[str] = ()) -> dict[str, str]:
+    """Return everything that is known before a run, in words; facts of the computer as JSON."""
+    return {
+        "format": FORMAT,
+        "version": __version__,
+        "rig": rig.name,
+        "began": utc_now().isoformat(timespec="milliseconds"),
+        "note": note,
+        "faults": json.dumps(list(faults)),
+        "protocol": f"{PROTOCOL_HASH:08x}",
+        "git": git_state(Path(__file__).parent),
+        "host": json.dumps(host_facts()),
+    }
+
+
+def rig_json(rig: Rig) -> str:
+    """Return a rig so that `Rig.model_validate(json.loads(...))` makes the same one; infinity survives."""
+    return json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str)
+
+
+def git_state(folder: Path) -> str:
+    """Return commit and whether anything was changed since; empty where this is no checkout."""
+    git = shutil.which("git")
+    if git is None:
+        return ""
+    try:
+        commit = _ask(git, folder, "rev-parse", "HEAD")
+        changed = _ask(git, folder, "status", "--porcelain", "--untracked-files=no")
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return f"{commit} (changed)" if changed else commit
+
+
+def _ask(git: str, folder: Path, *words: str) -> str:
+    done = subprocess.run(  # noqa: S603 - git, with words of our own
+        [git, "-C", str(folder), *words], capture_output=True, text=True, timeout=_GIT_S, check=True
+    )
+    return done.stdout.strip()

@@ -1,0 +1,91 @@
+"""A recorded run through observer and controller again: the same gains give the same numbers, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.predictor import Predictor
+from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.trajectory import Trajectory
+from dcmp_hil.values import Reference, Sample
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.values import Estimate
+
+_AT = {name: place for place, name in enumerate(FIELDS)}
+_LOWERING = "lowering the arm"
+
+
+@dataclass(frozen=True)
+class Again:
+    """What observer and controller say to the samples of a run.
+
+    Parameters
+    ----------
+    estimate
+        Position, velocity, disturbance in SI units, shape (n, 3).
+    demand
+        V, shape (n,).
+    """
+
+    estimate: NDArray[np.float64]
+    demand: NDArray[np.float64]
+
+
+def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
+    """Hand the recorded samples, references and voltages to observer, predictor and controller.
+
+    What was measured stays as it was: a controller that asks for something else does not move this arm.
+
+    Parameters
+    ----------
+    recorded
+        The run.
+    rig
+        Another observer or controller; None takes those of the run.
+    """
+    rig = rig or recorded.rig
+    trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
+    observer, controller = make_observer(rig, trajectory), make_controller(rig)
+    measured = rig.controller.position == "measured"
+    predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
+    past = _Past(recorded, trajectory, rig.delay)
+    estimates, demands = [], []
+    for row in recorded.rows.tolist():
+        sample = Sample(row[0], row[1], row[2], int(row[3]))
+        estimate = observer.update(sample)
+        past.follow(row, estimate)
+        ahead = predictor.ahead(sample, estimate)
+        demands.append(controller.update(Reference(*row[_AT["position_ahead"] :][:3]), ahead))
+        predictor.sent(row[_AT["voltage_sent"]])
+        estimates.append(estimate)
+    return Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+
+
+class _Past:
+    """Takes the trajectory through what happened to it: held, begun, lowered. Friction is told from it."""
+
+    def __init__(self, recorded: RecordedRun, trajectory: Trajectory, delay: float) -> None:
+        self._trajectory, self._delay = trajectory, delay
+        self._lowered = [event.t for event in recorded.events if event.text == _LOWERING]
+        self._holds = True
+
+    def follow(self, row: list[float], estimate: Estimate) -> None:
+        """Do what the loop did in this period."""
+        t, began = row[0], row[_AT["began"]]
+        if self._holds:  # the first period of the run, and of the way down
+            self._holds = False
+            self._trajectory.hold(estimate.position)
+        if t == began:
+            self._trajectory.begin(t, estimate.position)
+        if t in self._lowered:
+            self._trajectory.lower(t + self._delay)
+            self._holds = True

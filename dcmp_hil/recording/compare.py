@@ -1,0 +1,90 @@
+"""A recorded run and what came of it a second time, side by side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dcmp_hil.recording.again import Again
+    from dcmp_hil.recording.reader import RecordedRun
+
+    Column = NDArray[np.float64]
+
+
+class Line(NamedTuple):
+    """One figure of both; None where it is not known."""
+
+    name: str  # with its unit
+    recorded: float | None
+    again: float | None
+
+
+class Comparison(NamedTuple):
+    """What `--json` writes.
+
+    Parameters
+    ----------
+    identical
+        Whether every number is the same, to the bit.
+    rows
+        Periods compared.
+    figures
+        Both runs' figures, and the largest differences.
+    """
+
+    identical: bool
+    rows: int
+    figures: tuple[Line, ...]
+
+
+def compare(recorded: RecordedRun, again: Again) -> Comparison:
+    """Compare what observer and controller said then and now."""
+    block = recorded.block
+    names = ("position", "velocity", "disturbance")
+    then = np.stack([block[f"{name}_estimate"] for name in names], axis=1)
+    demand = block["voltage_demand"]
+    same = _bits(then) == _bits(again.estimate) and _bits(demand) == _bits(again.demand)
+    true = {name: block[f"{name}_true"] for name in names}
+    duration = float(block["t"][-1] - block["t"][0]) if len(block) > 1 else 0.0
+    figures = [
+        *(
+            Line(
+                f"{name}_error_rms_{unit}",
+                _rms(then[:, k] - true[name]),
+                _rms(again.estimate[:, k] - true[name]),
+            )
+            for k, (name, unit) in enumerate(zip(names, ("rad", "rad_s", "rad_s2"), strict=True))
+        ),
+        Line("demand_tv_V_s", _variation(demand, duration), _variation(again.demand, duration)),
+        Line("velocity_difference_max_rad_s", None, _largest(again.estimate[:, 1] - then[:, 1])),
+        Line("disturbance_difference_max_rad_s2", None, _largest(again.estimate[:, 2] - then[:, 2])),
+        Line("demand_difference_max_V", None, _largest(again.demand - demand)),
+    ]
+    return Comparison(same, len(block), tuple(figures))
+
+
+def _bits(values: Column) -> bytes:
+    """Return every bit: NaN is the same as NaN, and 0 not as -0."""
+    return np.ascontiguousarray(values).tobytes()
+
+
+def _known(values: Column) -> Column:
+    return values[np.isfinite(values)]
+
+
+def _rms(values: Column) -> float | None:
+    known = _known(values)
+    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+
+
+def _largest(values: Column) -> float | None:
+    known = _known(values)
+    return float(np.abs(known).max()) if len(known) else None
+
+
+def _variation(values: Column, duration: float) -> float | None:
+    return float(np.abs(np.diff(_known(values))).sum() / duration) if duration > 0.0 else None

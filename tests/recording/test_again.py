@@ -1,0 +1,185 @@
+"""A run's recording handed to observer and controller again, and written for others."""
+
+from __future__ import annotations
+
+import csv
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dcmp_hil import run
+from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.again import run_again
+from dcmp_hil.recording.compare import compare
+from dcmp_hil.recording.reader import read_run
+from dcmp_hil.recording.writer import Recording
+from tests.helpers import bench, named
+from tests.telemetry.runs import values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from dcmp_hil import controllers
+    from dcmp_hil.values import Estimate, Reference
+    from tests.cli.conftest import Outcome
+
+    Cli = Callable[..., Outcome]
+
+BOARD = "backend.kind=sim-board"
+
+
+def record(folder: Path, *overrides: str, duration: float = 3.0) -> Path:
+    rig = bench(*overrides)
+    sink = Recording(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
+    run(rig, duration=duration, fast=True, sinks=[sink])
+    return folder
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (),
+        ("observer.kind=paper",),
+        ("controller.friction_feedforward=true", "run.end=lower"),
+        ("controller.kind=pd", "controller.position=measured", "loop.delay_samples=0"),
+        ("encoder.counts_per_rev=ideal", "loop.rate_hz=2000"),
+        ("supervisor.start=immediate", "reference.kind=step"),
+        (BOARD, "backend.carrier=slcan"),
+    ],
+    ids=" ".join,
+)
+def test_the_same_gains_give_the_same_numbers_to_the_bit(tmp_path: Path, overrides: tuple[str, ...]) -> None:
+    recorded = read_run(record(tmp_path, *overrides))
+    result = compare(recorded, run_again(recorded))
+    assert result.identical
+    assert result.rows == len(recorded.rows) > 2000
+    assert {line.again for line in result.figures if "difference" in line.name} == {0.0}
+
+
+def test_lost_samples_are_lost_again(tmp_path: Path, cli: Cli) -> None:
+    fault = ("--fault", "wire.drop:p=0.05,at=1s")
+    assert cli("run", "--fast", "--duration", "3", "--set", BOARD, *fault).code == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    recorded = read_run(folder)
+    assert len(recorded.rows) < 2950
+    assert compare(recorded, run_again(recorded)).identical
+    assert json.loads(recorded.run["faults"]) == [fault[1]]
+
+
+def test_one_bit_of_difference_is_one(tmp_path: Path) -> None:
+    recorded = read_run(record(tmp_path, duration=1.0))
+    recorded.rows[500, 1] = np.nextafter(recorded.rows[500, 1], 9.0)
+    assert not compare(recorded, run_again(recorded)).identical
+
+
+class Mine:
+    """A user's own controller."""
+
+    def __init__(self, setting: controllers.Setting, gain: float = 100.0) -> None:
+        self._gain = gain * 5.4 / setting.model.ku
+
+    def update(self, reference: Reference, state: Estimate) -> float:
+        return self._gain * (reference.position - state.position) - 2.0 * state.velocity
+
+
+def test_a_controller_of_one_s_own_runs_again(tmp_path: Path) -> None:
+    own = (f"controller.kind={named(Mine)}", "controller.options={gain = 60.0}")
+    recorded = read_run(record(tmp_path, *own))
+    assert compare(recorded, run_again(recorded)).identical
+
+
+# ------------------------------------------------------------------------------------------ command line
+
+
+def test_replay_says_to_the_bit_and_compares_other_gains(tmp_path: Path, cli: Cli) -> None:
+    folder = str(record(tmp_path))
+    assert "every number is the same, to the bit" in cli("replay", folder).out.replace("\n", " ")
+    file = tmp_path / "figures.json"
+    outcome = cli("replay", folder, "--set", "observer.mu0_rad_s=90", "--json", str(file))
+    assert "the numbers differ" in outcome.out.replace("\n", " ")
+    figures = json.loads(file.read_text())
+    assert figures["identical"] is False
+    velocity = figures["velocity_error_rms_rad_s"]
+    assert velocity["again"] > 1.2 * velocity["recorded"]  # faster is noisier
+    assert figures["demand_difference_max_V"]["again"] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--set", "loop.rate_hz=500"), "what was measured stays as it was"),
+        (("--set", "observer.mu=5"), "unknown key"),
+        (("--set", "controller.kp_1_s2=-1"), "controller.kp_1_s2"),
+    ],
+)
+def test_what_cannot_be_changed_afterwards_is_refused(
+    tmp_path: Path, cli: Cli, arguments: tuple[str, ...], says: str
+) -> None:
+    outcome = cli("replay", str(record(tmp_path, duration=1.0)), *arguments)
+    assert outcome.code == 2
+    assert says in outcome.err.replace("\n", " ")
+
+
+def test_a_recording_that_was_cut_off_is_replayed_and_said_to_be(tmp_path: Path, cli: Cli) -> None:
+    path = record(tmp_path, duration=2.0) / "run.mcap"
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    outcome = cli("replay", str(path))
+    assert "was cut off: it ends at" in outcome.err.replace("\n", " ")
+    assert "to the bit" in outcome.out.replace("\n", " ")
+
+
+def test_set_is_for_recordings_of_our_own(tmp_path: Path, cli: Cli) -> None:
+    (tmp_path / "other.csv").write_text("time_s,position_rad,voltage_V\n0,0,0\n1,1,1\n")
+    outcome = cli("replay", str(tmp_path / "other.csv"), "--set", "observer.mu0_rad_s=5")
+    assert outcome.code == 2
+    assert "run.mcap" in outcome.err
+
+
+def test_exports_are_the_recording(tmp_path: Path, cli: Cli) -> None:
+    folder = record(tmp_path, duration=2.0)
+    made = {kind: tmp_path / f"out.{kind}" for kind in ("csv", "parquet", "rrd")}
+    options = [word for kind, path in made.items() for word in (f"--{kind}", str(path))]
+    assert cli("export", str(folder), *options).code == 0
+    table = read_run(folder).columns
+    with made["csv"].open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name, column in table.items():
+        read = np.array([float(row[name] or "nan") for row in rows])
+        assert read.tobytes() == column.tobytes() or np.array_equal(read, column, equal_nan=True), name
+    from pyarrow import parquet  # type: ignore[import-untyped]
+
+    read_back = parquet.read_table(made["parquet"])
+    assert read_back.column_names == list(table)
+    assert np.array_equal(read_back["velocity_estimate_rad_s"].to_numpy(), table["velocity_estimate_rad_s"])
+    assert read_back.schema.metadata[b"rig"] == b"bench-1khz"
+    assert np.array_equal(values(made["rrd"], "joint/position_rad")[:, 0], table["position_rad"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "Nothing to write"),
+        (("--csv", "run.mcap"), "is the recording itself"),
+        (("--csv", "no/where"), "may write"),
+    ],
+)
+def test_exports_that_cannot_be_are_refused(
+    tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], says: str
+) -> None:
+    record(tmp_path, duration=0.5)
+    monkeypatch.chdir(tmp_path)
+    outcome = cli("export", "run.mcap", *arguments)
+    assert outcome.code == 2
+    assert says in outcome.err.replace("\n", " ")
+
+
+def test_a_run_keeps_its_recording_unless_told_not_to(tmp_path: Path, cli: Cli) -> None:
+    assert cli("run", "--fast", "--duration", "1", "--note", "warm motor").code == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    read = read_run(folder)
+    assert (len(read.rows), read.run["note"], read.complete) == (1000, "warm motor", True)
+    assert read.events[-1].text == "amplifier at 0 V"
