@@ -192,7 +192,7 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
 
 
 def _pressed_us() -> int:
-    """Return how long somebody on this computer was ready to run and was not let, in all; 0 if nobody counts."""
+    """Return how long somebody here was ready to run and was not let, in all; 0 where nobody counts."""
     try:
         text = Path("/proc/pressure/cpu").read_text("utf-8")
     except OSError:
@@ -206,7 +206,8 @@ def _waited_ns(host: subprocess.Popen[bytes]) -> int:
 
 
 _HEAD = (
-    "| ended by | n | 0 V after, ms: median | max | gone after, s: max | without what others took | kept from running, ms: max | code "
+    "| ended by | n | 0 V after, ms: median | max | gone after, s: max | without what others took "
+    "| kept from running, ms: max | code "
     "| device | wrong | started again |"
 )
 
@@ -236,7 +237,8 @@ def table(endings: list[Ending]) -> str:
         rows.append(f"| {' | '.join(map(str, cells))} |")
     bounds = (
         f"bounds, by the firmware's clock: 0 V after {1e-3 * OFF_US:g} ms, the median after "
-        f"{1e-3 * USUAL_US:g} ms, less what the host was kept from running; gone, without what others took, after {GONE_S:g} s"
+        f"{1e-3 * USUAL_US:g} ms, less what the host was kept from running; "
+        f"gone, without what others took, after {GONE_S:g} s"
     )
     return "\n".join([*rows, "", bounds])
 
