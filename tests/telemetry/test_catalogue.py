@@ -1,0 +1,154 @@
+"""Rows S08, S09 and S10 of the fault catalogue, on whole runs: the loop sees nothing of it.
+
+What a killed telemetry process costs the recording (S09) is in tests/recording; here: what it costs the run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dcmp_hil.recording.reader import read_run
+from dcmp_hil.telemetry import viewer as window
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_PERIODS = 4000
+_RUN = ("run", "--duration", "4", "--json", "figures.json")
+_BOUND_S = 60.0
+_FIRST = 27_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+
+
+class Host:
+    """A `dcmp-hil run` in a folder of its own."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        environment = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+        ports = f"from dcmp_hil.telemetry import viewer; viewer.free_port.__defaults__ = ({_FIRST},)"
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", f"{ports}; from dcmp_hil.cli import main; main()", *_RUN, *options],
+            cwd=folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        )  # fmt: skip
+
+    def telemetry(self) -> int:
+        """Return the process that looks on, once it records."""
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+
+        def found() -> list[int]:
+            pids = [int(pid) for pid in children.read_text().split()]
+            return [pid for pid in pids if b"telemetry.child" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+        wait(lambda: any(self.folder.glob("runs/*/run.mcap")) and bool(found()))
+        return found()[0]
+
+    def figures(self) -> tuple[dict[str, Any], str]:
+        """Wait for its end; return its figures and what it said."""
+        _, said = self.process.communicate(timeout=_BOUND_S)
+        assert self.process.returncode == 0, said
+        figures: dict[str, Any] = json.loads((self.folder / "figures.json").read_text())
+        return figures, " ".join(said.split())
+
+
+def wait(until: Callable[[], bool]) -> None:
+    end = time.monotonic() + _BOUND_S
+    while not until():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
+    """`runs/` is a file system of half a megabyte: each recording is a warning, every period is driven."""
+    (tmp_path / "runs").mkdir()
+    unshare = shutil.which("unshare")
+    flags = ["--mount"] if os.geteuid() == 0 else ["--map-root-user", "--mount"]
+    script = 'mount -t tmpfs -o size=512k none runs && exec "$@"'
+    if (
+        unshare is None
+        or subprocess.run([unshare, *flags, "true"], check=False, capture_output=True).returncode
+    ):
+        if os.environ.get("CI") == "true":
+            pytest.fail("this test needs a mount namespace: as root, or where users may make them")
+        pytest.skip("this test needs a mount namespace: as root, or where users may make them")
+    command = [sys.executable, "-m", "dcmp_hil", *_RUN, "--viewer", "none"]
+    done = subprocess.run(
+        [unshare, *flags, "sh", "-c", script, "sh", *command],
+        cwd=tmp_path, check=False, capture_output=True, text=True, timeout=_BOUND_S,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["periods"] == _PERIODS
+    assert figures["dropped_periods"] == 0
+    troubles = [
+        sentence
+        for sentence in figures["troubles"]
+        if "incomplete" in sentence or "taken nothing" in sentence
+    ]
+    assert len(troubles) == len(figures["troubles"])
+    assert 1 <= len(troubles) <= 2  # run.mcap and run.rrd, one sentence each
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_s09_telemetry_that_is_killed_or_stands_still(tmp_path: Path, number: signal.Signals) -> None:
+    host = Host(tmp_path, "--viewer", "none")
+    pid = host.telemetry()
+    time.sleep(1.5)
+    os.kill(pid, number)
+    figures, said = host.figures()
+    assert figures["periods"] == _PERIODS
+    assert figures["dropped_periods"] == 0
+    assert said.count("The telemetry process") == 1
+    assert ("SIGKILL" if number == signal.SIGKILL else "did not answer") in said
+    (folder,) = (tmp_path / "runs").iterdir()
+    recorded = read_run(folder)
+    assert not recorded.complete
+    assert 500 < len(recorded.rows) < _PERIODS
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_s10_a_viewer_that_is_killed_or_stands_still(tmp_path: Path, number: signal.Signals) -> None:
+    host = Host(tmp_path, "--viewer", "serve")
+    telemetry = host.telemetry()
+    wait(lambda: bool(window.served(_FIRST)))
+    options = ["--headless", "--bind", window.LOOPBACK, "--port", "auto", "--hide-welcome-screen"]
+    viewer = subprocess.Popen(
+        [window.viewer_binary(), *options, "--connect", window.proxy_url(window.served(_FIRST)[0])],
+        env=window.viewer_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        time.sleep(1.5)
+        viewer.send_signal(number)
+        resident_kb = _resident_kb(telemetry)
+        figures, _ = host.figures()
+    finally:
+        viewer.kill()
+        viewer.wait()
+    assert figures["periods"] == _PERIODS
+    assert figures["dropped_periods"] == 0
+    assert resident_kb < 700_000
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert len(read_run(folder).rows) == _PERIODS
+    assert read_run(folder).complete
+
+
+def test_s10_no_viewer_ever(tmp_path: Path) -> None:
+    figures, said = Host(tmp_path, "--viewer", "connect").figures()
+    assert figures["periods"] == _PERIODS
+    assert "No viewer answers on 127.0.0.1:9876" in said
+
+
+def _resident_kb(pid: int) -> int:
+    (line,) = [
+        line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS")
+    ]
+    return int(line.split()[1])
