@@ -13,6 +13,7 @@ from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.check import check
 from dcmp_hil.cli.device import device
+from dcmp_hil.cli.live import set_keys, status, stop
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
@@ -31,6 +32,9 @@ app = typer.Typer(
 )
 for command in (run, check, paper, replay, device, rigs, ports, monitor):
     app.command()(command)
+app.command("set")(set_keys)
+app.command()(stop)
+app.command()(status)
 
 
 def _version(value: bool) -> None:

@@ -14,6 +14,8 @@ from dcmp_hil.observers.super_twisting import bandwidth_floor
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from pydantic.fields import FieldInfo
+
     from dcmp_hil.config.rig import Rig
     from dcmp_hil.section import Section
 
@@ -109,6 +111,15 @@ def _within_reason(rig: Rig) -> str:
     return "\n".join(
         fault for name, section in sections.items() for fault in _beyond_reason(name, section) if fault
     )
+
+
+def within_reason(field: FieldInfo, unit: str) -> tuple[float, float]:
+    """Return the smallest and the largest value that a key of that unit may have, infinite without a unit."""
+    largest = _REASON.get(unit, math.inf)
+    bounds = {name: getattr(one, name) for one in field.metadata for name in ("gt", "ge") if hasattr(one, name)}
+    if bounds.get("gt") == 0:
+        return _LEAST, largest
+    return bounds.get("ge", -largest), largest
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:
