@@ -204,7 +204,7 @@ class Session:
         if self._apart:
             self._apart.open()
         if self._control:
-            self._control.open(self.rig, self._apart and self._apart.ring_file, self._warn_live)
+            self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
         return nullcontext()
 
     def _warn_live(self, sentence: str) -> None:

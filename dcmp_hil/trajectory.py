@@ -1,4 +1,4 @@
-"""The trajectory of one run: hold, soft start into the reference, its changes, and the way down at the end."""
+"""The trajectory of one run: hold, soft start into the reference, changes of it, and the way down."""
 
 from __future__ import annotations
 

@@ -8,9 +8,7 @@ import typer
 
 from dcmp_hil.cli import console
 
-Run = Annotated[
-    int | None, typer.Option("--run", metavar="PID", help="Which run, where there are several.")
-]
+Run = Annotated[int | None, typer.Option("--run", metavar="PID", help="Which run, where there are several.")]
 
 
 def set_keys(

@@ -116,7 +116,9 @@ def _within_reason(rig: Rig) -> str:
 def within_reason(field: FieldInfo, unit: str) -> tuple[float, float]:
     """Return the smallest and the largest value that a key of that unit may have, infinite without a unit."""
     largest = _REASON.get(unit, math.inf)
-    bounds = {name: getattr(one, name) for one in field.metadata for name in ("gt", "ge") if hasattr(one, name)}
+    bounds = {
+        name: getattr(one, name) for one in field.metadata for name in ("gt", "ge") if hasattr(one, name)
+    }
     if bounds.get("gt") == 0:
         return _LEAST, largest
     return bounds.get("ge", -largest), largest

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
+from dcmp_hil.controllers import Gains
 from dcmp_hil.section import NotNegative, Section
 
 if TYPE_CHECKING:
     from dcmp_hil.controllers import Setting
     from dcmp_hil.values import Estimate, Reference
-
-
-class Gains(NamedTuple):
-    """What of the controller may change while it runs."""
-
-    kp: float  # 1/s2
-    kd: float  # 1/s
-    compensation: float  # 1 with w_hat, 0 without
 
 
 class PdSettings(Section):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from dcmp_hil.controllers.pd_compensated import Gains
+    from dcmp_hil.controllers import Gains
     from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.references import ReferenceSource
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
+from dcmp_hil.controllers import Gains
 from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING, Answer
 from dcmp_hil.supervisor import Phase
 from dcmp_hil.values import Event
@@ -13,10 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.controllers import Controller
-    from dcmp_hil.controllers.pd_compensated import Gains
     from dcmp_hil.live.change import Change
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
+    from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.trajectory import Trajectory
 
 RAMP = 0.25  # s, over which gains go from old to new
@@ -132,23 +133,34 @@ class LiveChanges:
                 return LOWERING
             self._trajectory.change(t + self._delay, change.reference)
         if change.tuning is not None:
-            self._observer.retune(change.tuning)  # type: ignore[attr-defined]
+            cast("_Tuned", self._observer).retune(change.tuning)
         if change.gains is not None:
-            self._ramp = _Ramp(self._controller, change.gains, t)
+            self._ramp = _Ramp(cast("_Geared", self._controller), change.gains, t)
         return APPLIED
+
+
+class _Tuned(Protocol):
+    """An observer of ours: a tuning is sent to no other."""
+
+    def retune(self, tuning: Tuning) -> None: ...
+
+
+class _Geared(Protocol):
+    """A controller of ours: gains are sent to no other."""
+
+    gains: Gains
 
 
 class _Ramp:
     """Gains on their way."""
 
-    def __init__(self, controller: Controller, wanted: Gains, t: float) -> None:
+    def __init__(self, controller: _Geared, wanted: Gains, t: float) -> None:
         self._controller, self._wanted, self._t0 = controller, wanted, t
-        self._from: Gains = controller.gains  # type: ignore[attr-defined]
+        self._from = controller.gains
 
     def over(self, t: float) -> bool:
         """Set the gains of device time `t`, s; tell whether they are the wanted ones."""
         s = min(max((t - self._t0) / RAMP, 0.0), 1.0)
-        pairs = zip(self._from, self._wanted, strict=True)
-        gains = self._wanted if s == 1.0 else self._wanted._make(a + s * (b - a) for a, b in pairs)
-        self._controller.gains = gains  # type: ignore[attr-defined]
+        kp, kd, compensation = (a + s * (b - a) for a, b in zip(self._from, self._wanted, strict=True))
+        self._controller.gains = Gains(kp, kd, compensation) if s < 1.0 else self._wanted
         return s == 1.0

@@ -127,7 +127,10 @@ class Server:
         except DcmpError as error:
             return {"ok": False, "said": str(error)}
         if answer is None:
-            return {"ok": False, "said": f"The run did not take it within {_ANSWER:g} s: it is starting or ending."}
+            return {
+                "ok": False,
+                "said": f"The run did not take it within {_ANSWER:g} s: it is starting or ending.",
+            }
         if answer.what != APPLIED:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
             return {"ok": False, "said": f"The run did not take it: {why}."}
@@ -172,7 +175,9 @@ async def _live(line: socket.socket, server: Server, parent: int) -> None:
 
 def main(line: int, setup: int, parent: int) -> None:
     """Serve the run of process `parent`; `line` and `setup` are descriptors."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the end is the run's to tell
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Ctrl-C reaches the whole group; the end is the run's to tell
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     os.lseek(setup, 0, os.SEEK_SET)
     with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:

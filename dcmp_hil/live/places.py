@@ -30,10 +30,12 @@ def folder() -> Path:
         place.mkdir(mode=_MINE, exist_ok=True)
         found = place.lstat()
     except OSError as error:
-        raise ConfigError(f"{place}: {error.strerror}. Set XDG_RUNTIME_DIR to a folder of your own.") from None
+        raise ConfigError(
+            f"{place}: {error.strerror}. Set XDG_RUNTIME_DIR to a folder of your own."
+        ) from None
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
         raise ConfigError(
-            f"{place} is no folder that only you may use. Remove it, or set XDG_RUNTIME_DIR to one of your own."
+            f"{place} is no folder of yours alone. Remove it, or set XDG_RUNTIME_DIR to one that is."
         )
     return place
 

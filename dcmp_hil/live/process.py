@@ -58,9 +58,7 @@ class ControlProcess:
         os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring)))
         self._line, theirs = socket.socketpair()
         with theirs:
-            code = _CODE.format(
-                path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid()
-            )
+            code = _CODE.format(path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid())
             try:
                 self._process = subprocess.Popen(  # noqa: S603 - our own code
                     [sys.executable, "-c", code],
@@ -93,6 +91,6 @@ class ControlProcess:
             code = self._process.wait()
             if not self._closing:
                 self._warn(
-                    f"The control process ended (exit code {code}): `dcmp-hil set`, `stop` and `panel` reach this "
-                    "run no more; it goes on, and Ctrl-C ends it."
+                    f"The control process ended (exit code {code}): `dcmp-hil set`, `stop` and `panel` "
+                    "reach this run no more; it goes on, and Ctrl-C ends it."
                 )

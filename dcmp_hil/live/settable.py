@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import observers
 from dcmp_hil.config import change_rig
-from dcmp_hil.config.explain import bandwidth_floor, slope_bound
 from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.change import Change
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
 from dcmp_hil.references.table import Table
 
 if TYPE_CHECKING:
@@ -73,12 +72,15 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
     _refuse(rig, [key for key in keys if _known(rig, key) and key not in settable(rig)])
     after = change_rig(rig, overrides)
     if isinstance(after.reference, Table) and after.reference != rig.reference:
-        raise ConfigError('reference.kind: "csv" is read before a run, not in one. Start another run with it.')
+        raise ConfigError(
+            'reference.kind: "csv" is read before a run, not in one. Start another run with it.'
+        )
     _refuse(after, [key for key in keys if key not in settable(after)])
     if type(after.controller) is not type(rig.controller) or type(after.observer) is not type(rig.observer):
-        raise ConfigError("A class of your own takes the place of no other in a run. Start another run with it.")
+        raise ConfigError(
+            "A class of your own takes the place of no other in a run. Start another run with it."
+        )
     return after, _worked_out(rig, after)
-
 
 
 def _refuse(rig: Rig, keys: list[str]) -> None:

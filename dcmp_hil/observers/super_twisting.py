@@ -153,19 +153,22 @@ class SuperTwisting:
         )
 
     def retune(self, tuning: Tuning) -> None:
-        """Go on with other gains; the next estimate follows from the present one as if they had been these.
+        """Go on with other gains, from the same position, velocity, disturbance and slope of the disturbance.
 
-        e = y - z1 obeys e' = x2 - z2 - L1 e, so that v2 and v3, which stand for e' and e'', mean something
-        else under another L1 or L2: they are worked out anew from the estimate, which stays.
+        e = y - z1 obeys e'' + (L1 + f0) e' + (L2 + f0 L1) e = w. Under another L1 or L2 the present e would
+        be far from where w leads it, and the way there faster than the differentiator can follow: the copy
+        is moved to where e has arrived.
         """
-        v1 = self._v1
-        x2 = self._z2 + self._v2 + self._L1 * v1
-        w = self._v3 + self._w2 * self._v2 + self._w1 * v1
+        v1, v2, v3 = self._v1, self._v2, self._v3
+        x1, x2 = self._z1 + v1, self._z2 + v2 + self._L1 * v1
+        w, slope = v3 + self._w2 * v2 + self._w1 * v1, self._w2 * v3 + self._w1 * v2
         same = (tuning.L1, tuning.L2) == (self._L1, self._L2)
         self._use(tuning)
-        if not same:
-            self._v2 = x2 - self._z2 - self._L1 * v1
-            self._v3 = w - self._w2 * self._v2 - self._w1 * v1
+        if same:
+            return
+        self._v2, self._v3 = slope / self._w1, 0.0
+        self._v1 = (w - self._w2 * self._v2) / self._w1
+        self._z1, self._z2 = x1 - self._v1, x2 - self._v2 - self._L1 * self._v1
 
     def _use(self, tuning: Tuning) -> None:
         self._L1, L2, self.M, self.mu0, self._nominal, self._gaps = tuning
