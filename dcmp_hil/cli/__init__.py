@@ -15,6 +15,7 @@ from dcmp_hil.cli.check import check
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.live import set_keys, status, stop
 from dcmp_hil.cli.monitor import monitor
+from dcmp_hil.cli.panel import panel
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
@@ -35,6 +36,7 @@ for command in (run, check, paper, replay, device, rigs, ports, monitor):
 app.command("set")(set_keys)
 app.command()(stop)
 app.command()(status)
+app.command()(panel)
 
 
 def _version(value: bool) -> None:
