@@ -167,7 +167,7 @@ class Session:
         """
         line, recorder = self._line, self._recorder
         began_ns = self._wall.now_ns()
-        end, last_words = _AT_ZERO, "it ended as it was meant to, at 0 V"
+        end, why = _AT_ZERO, ""
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
             with self.stop, self._open_telemetry(), self._realtime or nullcontext():
@@ -178,20 +178,20 @@ class Session:
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
-            end, last_words = _end_after(seen), str(trip)
+            end, why = _end_after(seen), f"{trip} "
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
             raise trip from None
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
-            end, last_words = _end_after(error), str(error)
+            end, why = _end_after(error), f"{error} "
             raise
         except BaseException as error:
-            end, last_words = _end_after(error), str(error)
+            end, why = _end_after(error), f"{error} "
             raise
         finally:
             if self._control:
-                self._control.close(last_words)
+                self._control.close(f"{why}({end[1]})")
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.event(Event(recorder.t, *end))

@@ -147,7 +147,7 @@ class Server:
 
     async def say_goodbye(self) -> None:
         """Tell whoever watches how the run ended."""
-        ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself"}
+        ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
         for writer in tuple(self._watchers):
             with suppress(OSError):
                 await asyncio.wait_for(_send(writer, ended), 0.2)

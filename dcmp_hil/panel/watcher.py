@@ -45,7 +45,7 @@ class Watcher:
                     await self._follow(pid)
                 self.run = None
                 if self.state["connection"] != "ended":
-                    self.state = {"connection": "ended", "ended": "its control process is gone"}
+                    self.state = {"connection": "ended", "ended": "its control process is gone."}
             await asyncio.sleep(_LOOK)
 
     def _find(self) -> int | None:

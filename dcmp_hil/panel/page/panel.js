@@ -240,7 +240,7 @@ function drawState() {
   by("time").textContent = typeof state.t_s === "number" ? `${state.t_s.toFixed(1)} s` : "";
   const sentences = {
     none: "No run yet. Start one with `dcmp-hil run`: this page finds it.",
-    ended: `The run has ended: ${state.ended}. The next one is found by itself.`,
+    ended: `The run has ended: ${state.ended} The next one is found by itself.`,
     silent: "The control process does not answer. The run goes on; STOP works all the same.",
     lost: "The page's server is gone: start `dcmp-hil panel` again. STOP is Ctrl-C where the run was started.",
   };
@@ -263,7 +263,8 @@ function take(now) {
     drawTrace();
   }
   if (now.connection === "ended") {
-    by("voltage").textContent = "–";
+    by("voltage").textContent = now.ended?.includes("amplifier at 0 V") ? "0.00" : "–";
+    by("meter").style.width = "0";
   }
   drawState();
 }
