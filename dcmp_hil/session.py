@@ -191,7 +191,7 @@ class Session:
             raise
         finally:
             if self._control:
-                self._control.close(f"{why}({end[1]})")
+                self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.")
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.event(Event(recorder.t, *end))

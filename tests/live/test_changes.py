@@ -116,7 +116,7 @@ def test_events_and_result_tell_of_a_change() -> None:
     sentence = "controller.kp_1_s2: 4000 -> 5200, applied at t = 3.500 s"
     assert result.changes == (sentence,)
     assert [event.level for event in result.events if event.text == sentence] == ["INFO"]
-    assert run.control.last_words == "(amplifier at 0 V)"
+    assert run.control.last_words == "Amplifier at 0 V."
 
 
 @pytest.mark.parametrize("withdrawn", [True, False])

@@ -93,7 +93,7 @@ def test_page_changes_a_run_shows_what_was_applied_and_stops_it(tmp_path: Path) 
         _by(page, "stop").click()
         run.communicate(timeout=BOUND)
         until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
-        until(lambda: "amplifier at 0 V" in _text(page, "banner"), "the page said how")
+        until(lambda: "Amplifier at 0 V." in _text(page, "banner"), "the page said how")
         assert _text(page, "voltage") == "0.00"
         _keep_picture(page, "panel-ended.png")
         assert _complaints(page) == []

@@ -4,7 +4,7 @@
 const by = (id) => document.getElementById(id);
 const STARTING = ["arming", "probing", "settling", "engaging"];
 const EVERY_MS = 150; // between two changes while a slider moves
-const TRACE_S = 20;
+const [LEAST_S, TRACE_S] = [2, 20]; // of time that the lines show
 const GROUPS = { controller: "Controller", observer: "Observer", reference: "Reference" };
 const LOG = 2; // lines
 
@@ -52,6 +52,7 @@ document.addEventListener("keydown", (event) => {
 // ---------------------------------------------------------------- knobs
 
 const round = (value) => Number(value.toPrecision(4));
+const unit = (text) => text.replace(/2\b/g, "²").replace(/3\b/g, "³");
 const shown = (value) => (typeof value === "number" ? String(Number(value.toPrecision(6))) : value);
 const toSlider = (knob, value) => (knob.decades ? Math.log10(value) : value);
 const fromSlider = (knob, value) => (knob.decades ? 10 ** value : value);
@@ -97,11 +98,11 @@ class Slider extends Row {
     const name = knob.key.split(".")[1].replace(new RegExp(`_${knob.unit.replaceAll("/", "_")}$`), "");
     this.element = document.createElement("div");
     this.element.className = "knob";
-    this.element.title = `${knob.key}: ${knob.meaning} Allowed: ${shown(knob.low)} to ${shown(knob.high)} ${knob.unit}.`;
+    this.element.title = `${knob.key}: ${knob.meaning} Allowed: ${shown(knob.low)} to ${shown(knob.high)} ${unit(knob.unit)}.`;
     this.element.innerHTML = '<label><b></b><span></span></label><output class="applied"></output><input type="range"><input type="number" step="any">';
     const [label, applied, slider, number] = this.element.children;
     label.children[0].textContent = name;
-    label.children[1].textContent = `${shown(round(knob.slider[0]))} … ${shown(round(knob.slider[1]))} ${knob.unit}`;
+    label.children[1].textContent = `${shown(round(knob.slider[0]))} … ${shown(round(knob.slider[1]))} ${unit(knob.unit)}`;
     [slider.ariaLabel, number.ariaLabel] = [`${knob.key} slider`, `${knob.key} in ${knob.unit}`];
     [slider.id, number.id, applied.id] = ["slider", "number", "applied"].map((what) => `${what}-${knob.key}`);
     [slider.min, slider.max] = knob.slider.map((value) => toSlider(knob, value));
@@ -189,39 +190,55 @@ function drawNumbers() {
   by("meter").style.width = `${50 * Math.abs(part)}%`;
 }
 
+const LANES = [
+  { title: "position, reference", unit: "rad", digits: 2, lines: [["reference_rad", "#5abe5f"], ["position_rad", "#9fb6cc"]] },
+  { title: "tracking error", unit: "mrad", digits: 1, lines: [["error_mrad", "#f05050"]] },
+  { title: "voltage", unit: "V", digits: 1, lines: [["voltage_V", "#4696f5"]] },
+];
+
 function drawTrace() {
   const canvas = by("trace");
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const scale = window.devicePixelRatio;
-  if (canvas.width !== width * scale) canvas.width = width * scale;
-  if (canvas.height !== height * scale) canvas.height = height * scale;
+  [canvas.width, canvas.height] = [width * scale, height * scale]; // clears it
+  if (!trace.length || !width) return;
   const pen = canvas.getContext("2d");
-  pen.setTransform(scale, 0, 0, scale, 0, 0);
-  pen.clearRect(0, 0, width, height);
-  pen.strokeStyle = "#28313d";
-  pen.beginPath();
-  pen.moveTo(0, height / 2);
-  pen.lineTo(width, height / 2);
-  pen.stroke();
-  if (!trace.length) return;
+  pen.scale(scale, scale);
+  pen.font = "12px system-ui, sans-serif";
   const end = trace.at(-1).t_s;
-  for (const [names, colours] of [
-    [["reference_rad", "position_rad"], ["#5abe5f", "#9fb6cc"]],
-    [["voltage_V"], ["#4696f5"]],
-    [["error_mrad"], ["#f05050"]],
-  ]) {
-    const most = Math.max(1e-9, ...names.flatMap((name) => trace.map((one) => Math.abs(one[name] ?? 0)))) * 1.15;
-    names.forEach((name, k) => {
-      pen.strokeStyle = colours[k];
-      pen.lineWidth = 1.6;
+  const span = Math.max(LEAST_S, Math.min(TRACE_S, end - trace[0].t_s));
+  const left = 64;
+  const x = (t) => left + (width - left - 4) * (1 - (end - t) / span);
+  LANES.forEach((lane, k) => {
+    const [top, tall] = [(k * height) / LANES.length + 22, height / LANES.length - 28];
+    const values = trace.flatMap((one) => lane.lines.map(([name]) => one[name])).filter((v) => typeof v === "number");
+    if (!values.length) return;
+    let [low, high] = [Math.min(...values, 0), Math.max(...values, 0)];
+    if (high - low < 1e-6) [low, high] = [-1, 1];
+    const y = (value) => top + tall * (1 - (value - low) / (high - low));
+    pen.fillStyle = "#8b98a8";
+    pen.textAlign = "left";
+    pen.fillText(`${lane.title}, ${lane.unit}`, left, top - 8);
+    pen.textAlign = "right";
+    if (k === 0) pen.fillText(`last ${span.toFixed(0)} s`, width - 6, top - 8);
+    for (const value of new Set([low, 0, high])) {
+      const far = value === 0 || Math.abs(y(value) - y(0)) > 12;
+      if (far) pen.fillText(value.toFixed(lane.digits).replace("-", "−"), left - 8, y(value) + 4);
+      pen.strokeStyle = value === 0 ? "#3a4655" : "#222a34";
+      pen.lineWidth = 1;
       pen.beginPath();
-      for (const one of trace) {
-        if (typeof one[name] !== "number") continue;
-        pen.lineTo(width * (1 - (end - one.t_s) / TRACE_S), height * (0.5 - (0.5 * one[name]) / most));
-      }
+      pen.moveTo(left, y(value));
+      pen.lineTo(width, y(value));
       pen.stroke();
-    });
-  }
+    }
+    for (const [name, colour] of lane.lines) {
+      pen.strokeStyle = colour;
+      pen.lineWidth = 1.8;
+      pen.beginPath();
+      for (const one of trace) if (typeof one[name] === "number") pen.lineTo(x(one.t_s), y(one[name]));
+      pen.stroke();
+    }
+  });
 }
 
 function drawState() {
@@ -263,7 +280,7 @@ function take(now) {
     drawTrace();
   }
   if (now.connection === "ended") {
-    by("voltage").textContent = now.ended?.includes("amplifier at 0 V") ? "0.00" : "–";
+    by("voltage").textContent = now.ended?.includes("Amplifier at 0 V.") ? "0.00" : "–";
     by("meter").style.width = "0";
   }
   drawState();
