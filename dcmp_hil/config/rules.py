@@ -14,8 +14,6 @@ from dcmp_hil.observers.super_twisting import bandwidth_floor
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from pydantic.fields import FieldInfo
-
     from dcmp_hil.config.rig import Rig
     from dcmp_hil.section import Section
 
@@ -113,15 +111,14 @@ def _within_reason(rig: Rig) -> str:
     )
 
 
-def within_reason(field: FieldInfo, unit: str) -> tuple[float, float]:
-    """Return the smallest and the largest value that a key of that unit may have, infinite without a unit."""
-    largest = _REASON.get(unit, math.inf)
-    bounds = {
-        name: getattr(one, name) for one in field.metadata for name in ("gt", "ge") if hasattr(one, name)
-    }
-    if bounds.get("gt") == 0:
+def within_reason(section: type[Section], key: str) -> tuple[float, float]:
+    """Return the smallest and the largest number that a key of a table may have, infinite without a unit."""
+    described = section.model_json_schema()["properties"][key]
+    bounds = {name: bound for one in (described, *described.get("anyOf", ())) for name, bound in one.items()}
+    largest = _REASON.get(split_unit(key)[1], math.inf)
+    if bounds.get("exclusiveMinimum") == 0:
         return _LEAST, largest
-    return bounds.get("ge", -largest), largest
+    return float(bounds.get("minimum", -largest)), largest
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:

@@ -63,7 +63,7 @@ class Server:
     """
 
     def __init__(self, setup: Setup, parent: int) -> None:
-        self._rig = setup.rig
+        self._rig, self._knobs = setup.rig, knobs(setup.rig)
         self._parent = parent
         self._mailbox = Mailbox(mapped(setup.mailbox, SIZE))
         size = os.fstat(setup.ring).st_size
@@ -106,7 +106,7 @@ class Server:
 
     def _state(self) -> dict[str, Any]:
         state = state_of(self._ring.latest(), self._mailbox.phase, self._rig)
-        state |= {"pid": self._parent, "stopping": self._stopping, "knobs": knobs(self._rig)}
+        state |= {"pid": self._parent, "stopping": self._stopping, "knobs": self._knobs}
         return state
 
     def _stop(self) -> dict[str, Any]:
@@ -134,7 +134,7 @@ class Server:
         if answer.what != APPLIED:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
             return {"ok": False, "said": f"The run did not take it: {why}."}
-        self._rig = rig
+        self._rig, self._knobs = rig, knobs(rig)
         return {"ok": True, "said": f"{change.words}, applied at {answer.t:.3f} s", "t": answer.t}
 
     async def _hand_on(self, number: int) -> Answer | None:

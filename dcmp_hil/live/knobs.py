@@ -47,9 +47,10 @@ def _choice(rig: Rig, key: str) -> dict[str, Any]:
 
 def _number(rig: Rig, key: str) -> dict[str, Any]:
     section, _, name = key.partition(".")
-    field = type(getattr(rig, section)).model_fields[name]
+    kind = type(getattr(rig, section))
+    field = kind.model_fields[name]
     value = float(value_of(rig, key))
-    low, high = within_reason(field, split_unit(name)[1])
+    low, high = within_reason(kind, name)
     start, end = _SLIDERS.get(name, _ANGLES)
     if name == "mu0_rad_s":
         high = min(high, 0.3 / rig.period)

@@ -13,6 +13,7 @@ from dcmp_hil.errors import ConfigError
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 _MINE = 0o700
+_LONGEST = 80  # characters: the path of a socket may have 107
 _PATIENCE = 0.5  # s to connect in
 
 
@@ -25,6 +26,8 @@ def folder() -> Path:
         If it cannot be made, or belongs to somebody else.
     """
     base = os.environ.get("XDG_RUNTIME_DIR", "")
+    if len(base) > _LONGEST:
+        base = ""
     place = Path(base) / "dcmp-hil" if base and Path(base).is_dir() else Path(f"/tmp/dcmp-hil-{os.getuid()}")  # noqa: S108 - its owner and mode are checked
     try:
         place.mkdir(mode=_MINE, exist_ok=True)

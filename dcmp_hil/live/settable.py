@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import observers
 from dcmp_hil.config import change_rig
+from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
@@ -86,9 +87,14 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
 def _refuse(rig: Rig, keys: list[str]) -> None:
     if keys:
         raise ConfigError(
-            *(f"{key} cannot be changed in a run." for key in keys),
+            *(f"{key} cannot be changed in a run{_own(rig, key)}." for key in keys),
             f"These can: {', '.join(settable(rig))}.",
         )
+
+
+def _own(rig: Rig, key: str) -> str:
+    section = getattr(rig, key.partition(".")[0], None)
+    return f": {section.kind} is a class of your own" if isinstance(section, Custom) else ""
 
 
 def _known(rig: Rig, key: str) -> bool:
