@@ -48,8 +48,6 @@ def change(run: int, overrides: Sequence[str]) -> str:
         If it was refused, with the reason.
     """
     reply = _ask(run, {"do": "set", "changes": list(overrides)}, _SLOW)
-    if reply is None:
-        raise ConfigError(f"The run of process {run} does not answer. `dcmp-hil stop` ends it all the same.")
     if not reply.get("ok"):
         raise ConfigError(*str(reply.get("said", "refused")).splitlines())
     return str(reply["said"])
@@ -63,51 +61,63 @@ def status(run: int) -> dict[str, Any]:
     ConfigError
         If it does not answer.
     """
-    reply = _ask(run, {"do": "status"}, _SLOW)
-    if reply is None:
-        raise ConfigError(f"The run of process {run} does not answer. `dcmp-hil stop` ends it all the same.")
-    return reply
+    return _ask(run, {"do": "status"}, _SLOW)
 
 
 def stop(run: int) -> None:
-    """End a run as Ctrl-C does; where its control process does not answer, by the signal itself.
+    """End a run as Ctrl-C does; where its control process is silent, by the signal itself.
 
     Raises
     ------
     ConfigError
         If there is no such run any more.
     """
+    gone = ConfigError(f"The run of process {run} listens no more: it has ended, or does so now.")
     with socket.socket(socket.AF_UNIX) as connection:
         connection.settimeout(_STOP)
         try:
             connection.connect(str(socket_of(run)))
-        except (ConnectionRefusedError, FileNotFoundError):
-            raise ConfigError(f"The run of process {run} listens no more.") from None
+            if _exchange(connection, {"do": "stop"}) is None:
+                raise gone
+        except TimeoutError:
+            _interrupt(run, connection)
         except OSError:
-            pass
-        if _exchange(connection, {"do": "stop"}) is None and _parent_of(peer_of(connection)[0]) == run:
-            with suppress(ProcessLookupError):
-                os.kill(run, signal.SIGINT)
+            raise gone from None
 
 
-def _ask(run: int, request: dict[str, Any], patience: float) -> dict[str, Any] | None:
-    """Return the answer; None if there is none in time."""
-    with socket.socket(socket.AF_UNIX) as connection:
+def _interrupt(run: int, connection: socket.socket) -> None:
+    """Send the signal, if whoever listens is a child of that run: process ids are used again."""
+    if _parent_of(peer_of(connection)[0]) == run:
+        with suppress(ProcessLookupError):
+            os.kill(run, signal.SIGINT)
+
+
+def _ask(run: int, request: dict[str, Any], patience: float) -> dict[str, Any]:
+    """Return the answer.
+
+    Raises
+    ------
+    ConfigError
+        If there is none in time.
+    """
+    reply = None
+    with suppress(OSError), socket.socket(socket.AF_UNIX) as connection:
         connection.settimeout(patience)
-        try:
-            connection.connect(str(socket_of(run)))
-        except OSError:
-            return None
-        return _exchange(connection, request)
+        connection.connect(str(socket_of(run)))
+        reply = _exchange(connection, request)
+    if reply is None:
+        raise ConfigError(f"The run of process {run} does not answer. `dcmp-hil stop` ends it all the same.")
+    return reply
 
 
 def _exchange(connection: socket.socket, request: dict[str, Any]) -> dict[str, Any] | None:
-    try:
-        connection.sendall(json.dumps(request).encode() + b"\n")
-        with connection.makefile("rb") as lines:
+    """Return the answer; None if the other end closes, or answers nonsense."""
+    connection.sendall(json.dumps(request).encode() + b"\n")
+    with connection.makefile("rb") as lines:
+        try:
             reply = json.loads(lines.readline())
-    except (OSError, ValueError):
-        return None
+        except ValueError:
+            return None
     return reply if isinstance(reply, dict) else None
 
 

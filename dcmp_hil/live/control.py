@@ -58,14 +58,16 @@ class Server:
     ----------
     setup
         What it works with.
+    mailbox
+        The way to the loop.
     parent
         Process id of the run.
     """
 
-    def __init__(self, setup: Setup, parent: int) -> None:
+    def __init__(self, setup: Setup, mailbox: Mailbox, parent: int) -> None:
         self._rig, self._knobs = setup.rig, knobs(setup.rig)
         self._parent = parent
-        self._mailbox = Mailbox(mapped(setup.mailbox, SIZE))
+        self._mailbox = mailbox
         size = os.fstat(setup.ring).st_size
         self._ring = Ring(capacity_of(size), mapped(setup.ring, size))
         self._one_at_a_time = asyncio.Lock()
@@ -175,14 +177,13 @@ async def _live(line: socket.socket, server: Server, parent: int) -> None:
 
 def main(line: int, setup: int, parent: int) -> None:
     """Serve the run of process `parent`; `line` and `setup` are descriptors."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches the whole group; the end is the run's to tell
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     os.lseek(setup, 0, os.SEEK_SET)
     with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:
         connection.setblocking(False)
         prepared: Setup = pickle.load(file)  # noqa: S301 - written by our own parent
-        with suppress(DcmpError):
-            asyncio.run(_live(connection, Server(prepared, parent), parent))
+        mailbox = Mailbox(mapped(prepared.mailbox, SIZE))
+        try:
+            asyncio.run(_live(connection, Server(prepared, mailbox, parent), parent))
+        except (DcmpError, OSError) as error:
+            mailbox.tell_end(str(error).rstrip("."))
     os._exit(0)  # connections that are still open would be waited for

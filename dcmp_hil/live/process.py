@@ -65,6 +65,7 @@ class ControlProcess:
                     pass_fds=[theirs.fileno(), self._setup, self._file, ring],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                    start_new_session=True,  # Ctrl-C is the run's to hear
                 )
             except OSError as error:
                 warn(f"The control process could not be started ({error}): this run cannot be changed.")
@@ -90,7 +91,8 @@ class ControlProcess:
         with suppress(OSError):
             code = self._process.wait()
             if not self._closing:
+                why = self.mailbox.last_words or f"exit code {code}"
                 self._warn(
-                    f"The control process ended (exit code {code}): `dcmp-hil set`, `stop` and `panel` "
-                    "reach this run no more; it goes on, and Ctrl-C ends it."
+                    f"The control process ended ({why}): `dcmp-hil set`, `stop` and `panel` reach this run "
+                    "no more; it goes on, and Ctrl-C ends it."
                 )

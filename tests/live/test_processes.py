@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,7 +66,8 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
                 client.change(run.pid, [refused])
         control = _control_of(run.pid)
         client.stop(run.pid)
-        client.stop(run.pid)  # a second one changes nothing
+        with suppress(ConfigError):  # it may have left already
+            client.stop(run.pid)  # a second one changes nothing
         run.communicate(timeout=BOUND)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
@@ -108,6 +110,15 @@ def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
         run.communicate(timeout=BOUND)
         until(lambda: _gone(control), "the control process left", within=1.0)
     assert places.running() == []
+
+
+def test_run_says_why_nobody_listens_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
+    places.folder().chmod(0o755)
+    with started(tmp_path, *_RUN[:-4], "--duration", "3") as run:
+        _, err = run.communicate(timeout=BOUND)
+    assert run.returncode == 0
+    assert "The control process ended" in err
+    assert "is no folder of yours alone" in err
 
 
 def test_nobody_listens_when_that_is_wanted(tmp_path: Path) -> None:
