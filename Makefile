@@ -67,8 +67,8 @@ bench: $(DEV) ## measure, print a table
 
 lock: | $(BIN)/uv ## pin again after a change in pyproject.toml; ARGS=--upgrade for newer versions
 	@echo "Pinning the dependencies ..."
-	@$(COMPILE) --extra plot --output-file requirements.txt $(ARGS)
-	@$(COMPILE) --extra plot --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
+	@$(COMPILE) --extra plot --extra panel --output-file requirements.txt $(ARGS)
+	@$(COMPILE) --extra plot --extra panel --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
 
 clean: ## remove the environment, caches and reports; recordings in runs/ stay
 	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov reports .coverage .coverage.* \

@@ -11,6 +11,7 @@ from dcmp_hil.config.sections import Custom
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.limits import Limits
+from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
 from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
+    from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
     from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.recorder import Sink
@@ -42,7 +44,13 @@ _WATCH_FLOOR = 100.0  # rad/s, mu0 of the watching observer
 
 
 def assemble(
-    rig: Rig, clock: Clock, sinks: Sequence[Sink], *, in_line: bool, apart: Apart | None = None
+    rig: Rig,
+    clock: Clock,
+    sinks: Sequence[Sink],
+    *,
+    in_line: bool,
+    apart: Apart | None = None,
+    mailbox: Mailbox | None = None,
 ) -> tuple[Line, Recorder]:
     """Make every stage of the line, and the recorder that it reports to.
 
@@ -65,7 +73,10 @@ def assemble(
         backend=backend,
     )
     measured = rig.controller.position == "measured"
-    supervisor = make_supervisor(rig, recorder.event)
+    changes = mailbox and LiveChanges(
+        mailbox, trajectory, controller, observer, delay=rig.delay, notify=recorder.event
+    )
+    supervisor = make_supervisor(rig, changes.event if changes else recorder.event)
     line = Line(
         backend=backend,
         outliers=make_outliers(rig, supervisor),
@@ -78,6 +89,7 @@ def assemble(
         overruns=Overruns(rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None),
         clock=clock,
         delay=rig.delay,
+        changes=changes or NoChanges(),
     )
     return line, recorder
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from dcmp_hil.live.changes import NoChanges
 from dcmp_hil.values import Cycle, Timing
 
 if TYPE_CHECKING:
     from dcmp_hil.backends import Backend
     from dcmp_hil.clock import Clock
     from dcmp_hil.controllers import Controller
+    from dcmp_hil.live.changes import Changes
     from dcmp_hil.observers import Observer
     from dcmp_hil.outliers import Outliers
     from dcmp_hil.overruns import Overruns
@@ -51,6 +53,7 @@ class Line:
     overruns: Overruns
     clock: Clock
     delay: float  # s, from a sample to the instant at which its command acts
+    changes: Changes = field(default_factory=NoChanges)
 
 
 def run(line: Line, until: float, stop: Stop) -> float:
@@ -84,8 +87,8 @@ def run(line: Line, until: float, stop: Stop) -> float:
     backend, outliers, trajectory, supervisor, clock, delay = (
         line.backend, line.outliers, line.trajectory, line.supervisor, line.clock, line.delay,
     )  # fmt: skip
-    observer, predictor, controller, telemetry, overruns = (
-        line.observer, line.predictor, line.controller, line.telemetry, line.overruns,
+    observer, predictor, controller, telemetry, overruns, changes = (
+        line.observer, line.predictor, line.controller, line.telemetry, line.overruns, line.changes,
     )  # fmt: skip
     previous, first = math.nan, math.nan
 
@@ -110,6 +113,7 @@ def run(line: Line, until: float, stop: Stop) -> float:
         timing = _new(Timing, (arrived - previous, arrived - first - sample.t, left - arrived))
         telemetry.record(_new(Cycle, (sample, estimate, reference, demand, voltage, timing)))
         previous = arrived
+        changes.apply(sample.t)
 
         if supervisor.trip is not None:
             raise supervisor.trip

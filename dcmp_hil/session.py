@@ -13,6 +13,7 @@ from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
 from dcmp_hil.host import host_facts, in_words
+from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.realtime import Grant, RealTime
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.figures import Figures
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backends.device import LinkCounters
     from dcmp_hil.config import Rig
+    from dcmp_hil.live import Control
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
 
@@ -63,6 +65,8 @@ class Result:
         Samples left out because no arm can have been where they say.
     troubles
         Its first hundred warnings and errors, with their time; kept where events are not, too.
+    changes
+        What was changed while it went on, in words.
     """
 
     rig: Rig
@@ -76,6 +80,7 @@ class Result:
     overruns: int = 0
     outliers: int = 0
     troubles: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
 
 
 _AT_ZERO: tuple[Literal["INFO", "WARN"], str] = ("INFO", "amplifier at 0 V")
@@ -104,6 +109,8 @@ class Session:
         Asked once a period; its own unless somebody listens for signals earlier already.
     warn
         Told, in a sentence, what of telemetry the run goes on without.
+    control
+        Who may change the run while it goes on; None for nobody.
     """
 
     def __init__(
@@ -117,6 +124,7 @@ class Session:
         keep_columns: bool = True,
         stop: StopRequest | None = None,
         warn: Callable[[str], None] | None = None,
+        control: Control | None = None,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
@@ -137,7 +145,11 @@ class Session:
             here, sentences, there = sorted_out(sinks)
             model = rig.model.values()
             self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn, model=model)
-        self._line, self._recorder = assemble(rig, clock, here, in_line=fast, apart=self._apart)
+        self._control = control
+        mailbox = control.mailbox if control else None
+        self._line, self._recorder = assemble(
+            rig, clock, here, in_line=fast, apart=self._apart, mailbox=mailbox
+        )
         for sentence in sentences:
             self._recorder.event(Event(0.0, "WARN", sentence))
         self._realtime_factor = math.nan
@@ -156,7 +168,7 @@ class Session:
         """
         line, recorder = self._line, self._recorder
         began_ns = self._wall.now_ns()
-        end = _AT_ZERO
+        end, why = _AT_ZERO, ""
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
             with self.stop, self._open_telemetry(), self._realtime or nullcontext():
@@ -167,18 +179,20 @@ class Session:
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
-            end = _end_after(seen)
+            end, why = _end_after(seen), f"{trip} "
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
             raise trip from None
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
-            end = _end_after(error)
+            end, why = _end_after(error), f"{error} "
             raise
         except BaseException as error:
-            end = _end_after(error)
+            end, why = _end_after(error), f"{error} "
             raise
         finally:
+            if self._control:
+                self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.")
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.event(Event(recorder.t, *end))
@@ -190,7 +204,14 @@ class Session:
         """Let the telemetry process come up, before anything is armed and before we are real-time."""
         if self._apart:
             self._apart.open()
+        if self._control:
+            self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
         return nullcontext()
+
+    def _warn_live(self, sentence: str) -> None:
+        """Have the loop tell of something; called from another thread."""
+        if isinstance(self._line.changes, LiveChanges):
+            self._line.changes.warn(sentence)
 
     def _run_line(self) -> None:
         line, recorder = self._line, self._recorder
@@ -221,6 +242,7 @@ class Session:
             overruns=self._line.overruns.count,
             outliers=self._line.outliers.count,
             troubles=tuple(self._figures.troubles),
+            changes=tuple(getattr(self._line.changes, "made", ())),
         )
 
 

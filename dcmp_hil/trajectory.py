@@ -1,4 +1,4 @@
-"""The trajectory of one run: hold, soft start into the reference, and the way down at the end."""
+"""The trajectory of one run: hold, soft start into the reference, changes of it, and the way down."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from dcmp_hil.references import ReferenceSource
 
 LOWERING = 2.0  # s, from wherever the arm is to hanging
+_CHANGING = 1.0  # s, from one reference into another, at least
+_FASTEST, _HARDEST = 2.0, 10.0  # rad/s and rad/s2 that a change of position adds at most
 
 
 class Trajectory:
@@ -31,7 +33,13 @@ class Trajectory:
         self._t0 = 0.0
         self._x0 = 0.0
         self._begun = False
-        self._way_down: _WayDown | None = None
+        self._way_down: _Quintic | None = None
+        self._bridge: _Quintic | None = None  # what is left of the reference before the last change
+
+    @property
+    def lowering(self) -> bool:
+        """Whether the way down has been laid."""
+        return self._way_down is not None
 
     @property
     def began(self) -> float:
@@ -48,12 +56,32 @@ class Trajectory:
 
     def lower(self, t: float) -> None:
         """From `t` on, go down to position 0, hanging, in `LOWERING` seconds; nothing jumps."""
-        self._way_down = _WayDown(t, self.at(t))
+        self._way_down = _Quintic(t, LOWERING, self.at(t))
+
+    def change(self, t: float, source: ReferenceSource) -> None:
+        """Go over into another reference from device time `t` on (s), with no jump up to the acceleration.
+
+        The difference of the two at `t` is what a quintic takes to 0: in a second, or as much longer as
+        2 rad/s and 10 rad/s2 ask for. However often that is done, one quintic is left to work out.
+        """
+        before = self.at(t)
+        self._source, self._bridge = source, None
+        if self._begun:
+            gap = Reference(*(old - new for old, new in zip(before, self.at(t), strict=True)))
+            self._bridge = _Quintic(t, _time_to_bridge(gap), gap)
 
     def at(self, t: float) -> Reference:
         """Return the reference at device time `t`."""
         if self._way_down is not None and t >= self._way_down.t0:
             return self._way_down.at(t)
+        bridge = self._bridge
+        if bridge is None:
+            return self._unbridged(t)
+        x, v, a = self._unbridged(t)
+        left = bridge.at(t)
+        return Reference(x + left.position, v + left.velocity, a + left.acceleration)
+
+    def _unbridged(self, t: float) -> Reference:
         if not t < math.inf:  # NaN in, NaN out: the supervisor finds it in the demand
             return Reference(math.nan, math.nan, math.nan)
         if not self._begun or t < self._t0:
@@ -77,16 +105,23 @@ def _faded_in(reference: Reference, x0: float, s: float, length: float) -> Refer
     )
 
 
+def _time_to_bridge(gap: Reference) -> float:
+    """Return the length of a quintic over a gap: its peaks are 1.875 d / T and 5.774 d / T^2."""
+    distance = abs(gap.position)
+    return max(_CHANGING, 1.875 * distance / _FASTEST, math.sqrt(5.774 * distance / _HARDEST))
+
+
 @dataclass(frozen=True, slots=True)
-class _WayDown:
+class _Quintic:
     """The quintic that takes over position, velocity and acceleration at `t0` and ends in rest at 0."""
 
     t0: float
+    length: float
     start: Reference
 
     def at(self, t: float) -> Reference:
-        length = LOWERING
-        s = min((t - self.t0) / length, 1.0)
+        length = self.length
+        s = min(max((t - self.t0) / length, 0.0), 1.0)
         x, v, a = self.start.position, length * self.start.velocity, 0.5 * length**2 * self.start.acceleration
         # x0 left^3 (1 + 3 s + 6 s^2) + v0 left^3 (s + 3 s^2) + a0 left^3 s^2 / 2 with left = 1 - s
         left = 1.0 - s

@@ -14,7 +14,9 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.check import check
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
+from dcmp_hil.cli.live import set_keys, status, stop
 from dcmp_hil.cli.monitor import monitor
+from dcmp_hil.cli.panel import panel
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
@@ -33,6 +35,10 @@ app = typer.Typer(
 )
 for command in (run, check, paper, replay, export, device, rigs, ports, monitor, view):
     app.command()(command)
+app.command("set")(set_keys)
+app.command()(stop)
+app.command()(status)
+app.command()(panel)
 
 
 def _version(value: bool) -> None:

@@ -55,6 +55,9 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
             help="Let something go wrong, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
         ),
     ] = None,
+    no_control: Annotated[
+        bool, typer.Option("--no-control", help="Do not listen for `dcmp-hil set`, `stop` and `panel`.")
+    ] = False,
 ) -> None:
     """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
 
@@ -72,5 +75,6 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         json_file=json_file,
         note=note,
         faults=tuple(faults or ()),
+        control=not no_control,
     )
     raise typer.Exit(execute(rig, overrides or (), options))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from dcmp_hil.live.process import ControlProcess
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
@@ -47,6 +48,7 @@ class Options:
     note: str
     faults: tuple[str, ...] = ()
     port: int = 0  # of the recording's own server
+    control: bool = True
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
@@ -81,6 +83,7 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
         keep_columns=folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options),
         stop=stop,
         warn=console.warn,
+        control=_control(options),
     )
     ended_by = "duration"
     trip: TripError | None = None
@@ -99,6 +102,15 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
     finally:
         _conclude(session, options, folder, ended_by, trip)
     return stop.exit_code
+
+
+def _control(options: Options) -> ControlProcess | None:
+    """Let others change the run while it goes on; in virtual time it is over too soon."""
+    if options.fast or not options.control:
+        return None
+    from dcmp_hil.live.process import ControlProcess
+
+    return ControlProcess()
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
@@ -152,6 +164,7 @@ def _conclude(
         "overruns": result.overruns,
         "outliers": result.outliers,
         "troubles": result.troubles,
+        "changes": result.changes,
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
         "host": result.host,
     }

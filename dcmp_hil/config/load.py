@@ -75,6 +75,22 @@ def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: 
     return rig if folder is None else _with_reference_file(rig, folder, place, set_keys)
 
 
+def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:
+    """Return a rig with overrides on top of what it says, read and checked as those of `load_rig` are.
+
+    Raises
+    ------
+    ConfigError
+        With every fault found.
+    """
+    table = rig.model_dump(exclude_unset=True)
+    set_keys = apply_overrides(table, overrides)
+    try:
+        return Rig.model_validate(table)
+    except ValidationError as error:
+        raise ConfigError(*explain_faults(error, table, rig.name, set_keys)) from None
+
+
 def copy_rig(name: str, target: Path) -> list[Path]:
     """Write a shipped rig to `target`, and its schema beside it so that editors can complete and check it.
 

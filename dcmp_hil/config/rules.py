@@ -111,6 +111,16 @@ def _within_reason(rig: Rig) -> str:
     )
 
 
+def within_reason(section: type[Section], key: str) -> tuple[float, float]:
+    """Return the smallest and the largest number that a key of a table may have, infinite without a unit."""
+    described = section.model_json_schema()["properties"][key]
+    bounds = {name: bound for one in (described, *described.get("anyOf", ())) for name, bound in one.items()}
+    largest = _REASON.get(split_unit(key)[1], math.inf)
+    if bounds.get("exclusiveMinimum") == 0:
+        return _LEAST, largest
+    return float(bounds.get("minimum", -largest)), largest
+
+
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:
     for key, field in type(section).model_fields.items():
         value, unit = getattr(section, key), split_unit(key)[1]

@@ -29,4 +29,12 @@ class Setting(NamedTuple):
     period: float
 
 
-__all__ = ["Controller", "Setting"]
+class Gains(NamedTuple):
+    """What of a PD controller may change while it runs."""
+
+    kp: float  # 1/s2
+    kd: float  # 1/s
+    compensation: float  # 1 with w_hat, 0 without
+
+
+__all__ = ["Controller", "Gains", "Setting"]

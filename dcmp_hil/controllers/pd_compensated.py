@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+from dcmp_hil.controllers import Gains
 from dcmp_hil.section import NotNegative, Section
 
 if TYPE_CHECKING:
@@ -23,6 +24,11 @@ class PdSettings(Section):
     """Which position the proportional term takes: x1_hat (quiet) or the encoder's (as in the paper)."""
     friction_feedforward: bool = False
     """Tell the observer of Coulomb friction, f1 of [model], by the sign of the reference's velocity."""
+
+    @property
+    def gains(self) -> Gains:
+        """The gains without pydantic, for the loop."""
+        return Gains(self.kp_1_s2, self.kd_1_s, float(self.kind == "pd_compensated"))
 
     def build(self, setting: Setting) -> PdCompensated:
         """Make the controller for a rig."""
@@ -52,6 +58,15 @@ class PdCompensated:
         self._kp, self._kd = kp, kd
         self._f0, self._volts = setting.model.f0, 1.0 / setting.model.ku
         self._compensation = 1.0 if compensate else 0.0
+
+    @property
+    def gains(self) -> Gains:
+        """What it works with; may be set between two periods."""
+        return Gains(self._kp, self._kd, self._compensation)
+
+    @gains.setter
+    def gains(self, gains: Gains) -> None:
+        self._kp, self._kd, self._compensation = gains
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
         """Return the voltage to ask for, V."""

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.observers import Observer, Setting
+    from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.values import Estimate, Reference, Sample
 
 _CROSSING_RAD_S = 0.005  # the sign is a ramp inside it, so that the voltage stays continuous
@@ -46,6 +47,10 @@ class KnownFriction:
         self._t = sample.t
         rest = self._observer.update(sample._replace(voltage=sample.voltage + held * self._volts))
         return rest._replace(disturbance=rest.disturbance + self._friction(sample.t + self._ahead))
+
+    def retune(self, tuning: Tuning) -> None:
+        """Retune the observer that finds the rest."""
+        self._observer.retune(tuning)  # type: ignore[attr-defined]
 
     def _friction(self, t: float) -> float:
         """Return the friction believed to act at `t`, rad/s2."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -24,6 +24,17 @@ _NOTHING = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
 _Step = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
 
 
+class Tuning(NamedTuple):
+    """Everything that follows from gains, model and period: worked out once, and small enough to be sent."""
+
+    L1: float  # 1/s
+    L2: float  # 1/s2
+    M: float  # rad/s3
+    mu0: float  # rad/s
+    nominal: _Step
+    gaps: dict[int, _Step]  # by the number of periods
+
+
 class SuperTwistingSettings(Section):
     """`[observer]` with `kind = "super_twisting"`."""
 
@@ -36,6 +47,10 @@ class SuperTwistingSettings(Section):
     """Bound on the slope of w, rad/s3; by default 15, and 1000 for an ideal encoder. 0 = linear."""
     mu0_rad_s: NotNegative | None = Field(default=None)
     """Bandwidth floor, rad/s: the quiet/fast knob; by default from encoder and rate. 0 = no floor."""
+
+    def tuning(self, setting: Setting) -> Tuning:
+        """Work out what an observer of that rig is retuned with."""
+        return tune(setting, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
 
     def build(self, setting: Setting) -> SuperTwisting:
         """Make the observer for a rig."""
@@ -98,18 +113,10 @@ class SuperTwisting:
         M: float | None = None,
         mu0: float | None = None,
     ) -> None:
-        counts, period = setting.counts_per_rev, setting.period
-        self.M = slope_bound(counts) if M is None else M
-        self.mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
-        self._period = period
-        self._tolerance = _SAME_STEP * period
+        self._period = setting.period
+        self._tolerance = _SAME_STEP * setting.period
         self._f0, self._ku = setting.model.f0, setting.model.ku
-        self._L1, self._L2 = L1, L2
-        self._w1, self._w2 = L2 + self._f0 * L1, L1 + self._f0
-        # An innovation at least this large is slower than the floor.
-        self._floor_from = self.M / self.mu0**3 if self.mu0 > 0.0 else math.inf
-        self._nominal = self._solve(period)
-        self._gaps = {n: self._solve(n * period) for n in range(2, _LONGEST_GAP + 1)}
+        self._use(tune(setting, L1=L1, L2=L2, M=M, mu0=mu0))
         self._t = self._y = math.nan
         self._z1 = self._z2 = self._v1 = self._v2 = self._v3 = 0.0
 
@@ -145,17 +152,37 @@ class SuperTwisting:
             Estimate, (self._z1 + v1, self._z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1)
         )
 
+    def retune(self, tuning: Tuning) -> None:
+        """Go on with other gains, from the same position, velocity, disturbance and slope of the disturbance.
+
+        e = y - z1 obeys e'' + (L1 + f0) e' + (L2 + f0 L1) e = w. Under another L1 or L2 the present e would
+        be far from where w leads it, and the way there faster than the differentiator can follow: the copy
+        is moved to where e has arrived.
+        """
+        v1, v2, v3 = self._v1, self._v2, self._v3
+        x1, x2 = self._z1 + v1, self._z2 + v2 + self._L1 * v1
+        w, slope = v3 + self._w2 * v2 + self._w1 * v1, self._w2 * v3 + self._w1 * v2
+        same = (tuning.L1, tuning.L2) == (self._L1, self._L2)
+        self._use(tuning)
+        if same:
+            return
+        self._v2, self._v3 = slope / self._w1, 0.0
+        self._v1 = (w - self._w2 * self._v2) / self._w1
+        self._z1, self._z2 = x1 - self._v1, x2 - self._v2 - self._L1 * self._v1
+
+    def _use(self, tuning: Tuning) -> None:
+        self._L1, L2, self.M, self.mu0, self._nominal, self._gaps = tuning
+        self._L2 = L2
+        self._w1, self._w2 = L2 + self._f0 * self._L1, self._L1 + self._f0
+        # An innovation at least this large is slower than the floor.
+        self._floor_from = self.M / self.mu0**3 if self.mu0 > 0.0 else math.inf
+
     def _restart(self, t: float, y: float) -> Estimate:
         """Begin at rest where the arm is: never at 0, which would be a step of the whole position."""
         self._t, self._y = t, y
         self._z1, self._z2 = y, 0.0
         self._v1 = self._v2 = self._v3 = 0.0
         return Estimate(y, 0.0, 0.0)
-
-    def _solve(self, dt: float) -> _Step:
-        """Everything that depends on the step alone, flat: unpacked once a period."""
-        copy = luenberger_copy(dt, self._f0, self._L1, self._L2)
-        return (*copy, *_per_step(matched_gains(self.mu0 * dt), dt))
 
     def _step(self, dt: float) -> _Step | None:
         """Find the coefficients of a step that is not one period; None where nothing can be continued."""
@@ -166,13 +193,27 @@ class SuperTwisting:
         n = round(dt / self._period)
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
             return self._gaps[n]
-        return self._solve(dt)
+        return _solve(dt, self._f0, self._L1, self._L2, self.mu0)
 
     def _sliding_gains(self, b: float, dt: float) -> Gains:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
         size = abs(b)
         mu = self.mu0 if size < _NOTHING else (self.M / size) ** (1 / 3)
         return _per_step(matched_gains(mu * dt), dt)
+
+
+def tune(setting: Setting, *, L1: float, L2: float, M: float | None, mu0: float | None) -> Tuning:
+    """Work out every coefficient of an observer; the arguments are those of `SuperTwisting`."""
+    counts, period, f0 = setting.counts_per_rev, setting.period, setting.model.f0
+    M = slope_bound(counts) if M is None else M
+    mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
+    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, _LONGEST_GAP + 1)}
+    return Tuning(L1, L2, M, mu0, gaps.pop(1), gaps)
+
+
+def _solve(dt: float, f0: float, L1: float, L2: float, mu0: float) -> _Step:
+    """Everything that depends on the step alone, flat: unpacked once a period."""
+    return (*luenberger_copy(dt, f0, L1, L2), *_per_step(matched_gains(mu0 * dt), dt))
 
 
 def _per_step(gains: Gains, dt: float) -> Gains:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.live.changes import LiveChanges
+from dcmp_hil.live.mailbox import Mailbox
 from dcmp_hil.predictor import Predictor
+from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.trajectory import Trajectory
 from dcmp_hil.values import Reference, Sample
@@ -18,7 +22,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.values import Estimate
+    from dcmp_hil.values import Estimate, Event
 
 _AT = {name: place for place, name in enumerate(FIELDS)}
 _LOWERING = "lowering the arm"
@@ -43,6 +47,8 @@ class Again:
 def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
     """Hand the recorded samples, references and voltages to observer, predictor and controller.
 
+    Changes that were made while it went on are made again, in the same period.
+
     What was measured stays as it was: a controller that asks for something else does not move this arm.
 
     Parameters
@@ -58,6 +64,9 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
     measured = rig.controller.position == "measured"
     predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
     past = _Past(recorded, trajectory, rig.delay)
+    mailbox = Mailbox()
+    changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_nobody)
+    made = deque(changes_in(recorded.events, rig))
     estimates, demands = [], []
     for row in recorded.rows.tolist():
         sample = Sample(row[0], row[1], row[2], int(row[3]))
@@ -67,7 +76,14 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
         demands.append(controller.update(Reference(*row[_AT["position_ahead"] :][:3]), ahead))
         predictor.sent(row[_AT["voltage_sent"]])
         estimates.append(estimate)
+        if made and made[0][0] == sample.t:
+            mailbox.put(made.popleft()[1])
+        changes.apply(sample.t)
     return Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+
+
+def _nobody(_: Event) -> None:
+    """Tell nobody: it has been told."""
 
 
 class _Past:

@@ -76,6 +76,8 @@ class Apart:
         Rows that are in no figure, once closed.
     pid
         Of the process, once open; None if there is none.
+    ring_file
+        Descriptor of the ring's memory, for whoever else looks on.
     """
 
     def __init__(
@@ -89,6 +91,7 @@ class Apart:
     ) -> None:
         self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
         ring, ledger, self._setup, *kept = self._files
+        self.ring_file = ring
         self._kept = (kept[0], kept[1]) if keep else None
         self._ledger = Ledger(ledger)
         self._warn_user = warn

@@ -41,6 +41,11 @@ def size_of(capacity: int) -> int:
     return _HEAD + capacity * _SIZE
 
 
+def capacity_of(size: int) -> int:
+    """Return how many rows a ring of so many bytes holds."""
+    return (size - _HEAD) // _SIZE
+
+
 class Ring:
     """One producer, any number of consumers; the oldest rows are overwritten, whoever has read them.
 
@@ -84,6 +89,12 @@ class Ring:
         """Device time of the newest row, s; 0 before the first."""
         written = self.written
         return float(self._rows[(written - 1) % self.capacity, 1]) if written else 0.0
+
+    def latest(self) -> dict[str, float]:
+        """Return the newest row by `FIELDS`, for whoever needs no other; nothing before the first."""
+        written = self.written
+        row = self._rows[(written - 1) % self.capacity].tolist()
+        return dict(zip(FIELDS, row[1:], strict=True)) if written and row[0] == written - 1 else {}
 
     def __len__(self) -> int:
         """Rows waiting, those already lost included."""

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import csv
 import json
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from dcmp_hil import run
+from dcmp_hil.live.mailbox import APPLIED
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.recording.again import run_again
+from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench, named
+from tests.live.here import ChangedRun
 from tests.telemetry.runs import values
 
 if TYPE_CHECKING:
@@ -67,6 +71,36 @@ def test_lost_samples_are_lost_again(tmp_path: Path, cli: Cli) -> None:
     assert len(recorded.rows) < 2950
     assert compare(recorded, run_again(recorded)).identical
     assert json.loads(recorded.run["faults"]) == [fault[1]]
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        {1500: ("controller.kp_1_s2=5200.123456789", "controller.kd_1_s=150")},
+        {
+            1500: ("observer.mu0_rad_s=70.7",),
+            1600: ("controller.kind=pd",),
+            2200: ("controller.kind=pd_compensated",),
+        },
+        {1500: ("reference.rate_rad_s=1.25",), 2100: ("reference.kind=hold", "reference.position_rad=0.3")},
+        {1500: ("reference.offset_rad=-0.2", "observer.L1_1_s=6.1", "controller.kp_1_s2=3000")},
+    ],
+)
+@pytest.mark.parametrize("friction", ["true", "false"])
+def test_changes_made_in_a_run_are_made_again(tmp_path: Path, script: dict[int, Any], friction: str) -> None:
+    overrides = (f"controller.friction_feedforward={friction}",)
+    rig = bench(*overrides)
+    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
+    changed = ChangedRun(script, *overrides, duration=4.0, sinks=[sink])
+    changed.run()
+    assert {answer.what for answer in changed.answers if answer} == {APPLIED}
+    recorded = read_run(tmp_path)
+    assert len(changes_in(recorded.events, recorded.rig)) == len(script)
+    assert compare(recorded, run_again(recorded)).identical
+    told = friction == "true" or any(
+        not key.startswith("reference") for keys in script.values() for key in keys
+    )
+    assert compare(recorded, run_again(replace(recorded, events=()))).identical != told  # references are rows
 
 
 def test_one_bit_of_difference_is_one(tmp_path: Path) -> None:

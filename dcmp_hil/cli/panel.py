@@ -1,0 +1,47 @@
+"""`dcmp-hil panel`: a page with sliders and STOP."""
+
+from __future__ import annotations
+
+from typing import Annotated
+from urllib.parse import urlsplit
+
+import typer
+
+from dcmp_hil.cli import console
+from dcmp_hil.cli.live import Run
+
+
+def panel(
+    port: Annotated[int, typer.Option(metavar="N", min=1, max=65535, help="Of 127.0.0.1.")] = 8710,
+    run: Run = None,
+    viewer: Annotated[
+        str, typer.Option(metavar="URL", help="A web viewer that runs already, shown in the page.")
+    ] = "",
+) -> None:
+    """Serve a page for this machine's browser: gains, reference, what was applied, and STOP.
+
+    It finds the newest run by itself, and the next one when that has ended. Only somebody who has the
+    address that is printed, with its token, may use it.
+    """
+    import asyncio
+    from contextlib import suppress
+
+    from dcmp_hil.errors import ConfigError
+
+    parts = urlsplit(viewer)
+    if viewer and (parts.scheme not in {"http", "https"} or not parts.netloc):
+        raise ConfigError(f"--viewer {viewer}: expected a URL such as http://127.0.0.1:9090.")
+    try:
+        from dcmp_hil.panel.server import Panel
+    except ImportError:
+        raise ConfigError("The panel needs aiohttp: pip install 'dcmp-hil[panel]'") from None
+
+    def ready(address: str) -> None:
+        console.out.print(f"open {address}", highlight=False, markup=False)
+        console.note("Ctrl-C ends the page; a run that goes on is not touched by that.")
+
+    async def serve() -> None:
+        await Panel(port, run, viewer).serve(ready)
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve())

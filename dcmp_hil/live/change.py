@@ -1,0 +1,19 @@
+"""A change as the loop takes it: checked, worked out, and small."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from dcmp_hil.controllers import Gains
+    from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.references import ReferenceSource
+
+
+class Change(NamedTuple):
+    """What is to be different from the next period on; None stays as it is."""
+
+    words: str  # "controller.kp_1_s2: 4000 -> 5200"
+    gains: Gains | None = None
+    tuning: Tuning | None = None
+    reference: ReferenceSource | None = None

@@ -1,0 +1,166 @@
+"""The loop's side of live changes: one look a period, and a change that no voltage shows as a step."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Protocol, cast
+
+from dcmp_hil.controllers import Gains
+from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING, Answer
+from dcmp_hil.supervisor import Phase
+from dcmp_hil.values import Event
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.controllers import Controller
+    from dcmp_hil.live.change import Change
+    from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.observers import Observer
+    from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.trajectory import Trajectory
+
+RAMP = 0.25  # s, over which gains go from old to new
+_PLACES = {phase.value: place for place, phase in enumerate(Phase)}
+_KEPT = 1000  # changes that the summary lists
+_AWAKE = -1  # no number of a change: there is something to do every period
+
+
+class Changes(Protocol):
+    """What the loop asks of live changes."""
+
+    def apply(self, t: float) -> None:
+        """Apply what waits, between the period of device time `t` (s) and the next."""
+        ...
+
+
+class NoChanges:
+    """Nothing ever changes."""
+
+    def apply(self, t: float) -> None:
+        """Change nothing."""
+
+
+class LiveChanges:
+    """Applies what a mailbox holds.
+
+    Gains are ramped, an observer keeps its estimates, a reference keeps position, velocity and acceleration:
+    the voltage has no step.
+
+    Parameters
+    ----------
+    mailbox
+        One number of it is looked at every period.
+    trajectory, controller, observer
+        What is changed; a controller or observer of one's own never is.
+    delay
+        s, from a sample to the instant at which its command acts.
+    notify
+        Told of every change.
+
+    Attributes
+    ----------
+    made
+        What was changed, in words, up to the first thousand.
+    """
+
+    def __init__(
+        self,
+        mailbox: Mailbox,
+        trajectory: Trajectory,
+        controller: Controller,
+        observer: Observer,
+        *,
+        delay: float,
+        notify: Callable[[Event], None],
+    ) -> None:
+        self._mailbox, self._words = mailbox, mailbox.words
+        self._trajectory, self._controller, self._observer = trajectory, controller, observer
+        self._delay = delay
+        self._notify = notify
+        self._seen = self._number = mailbox.words[0]
+        self._ramp: _Ramp | None = None
+        self._news: deque[str] = deque()
+        self.made: list[str] = []
+
+    def apply(self, t: float) -> None:
+        """Apply what waits, between the period of device time `t` (s) and the next."""
+        if self._words[0] != self._seen:
+            self._look(t)
+
+    def event(self, event: Event) -> None:
+        """Pass an event on; a new phase is shown in the mailbox."""
+        if event.level == "PHASE":
+            self._mailbox.tell_phase(_PLACES.get(event.text, 0))
+        self._notify(event)
+
+    def warn(self, sentence: str) -> None:
+        """Have the loop tell of something; called from another thread."""
+        self._news.append(sentence)
+        self._seen = _AWAKE
+
+    def _look(self, t: float) -> None:
+        number = self._words[0]
+        if number != self._number:
+            self._number = number
+            self._take(number, t)
+        if self._ramp is not None and self._ramp.over(t):
+            self._ramp = None
+        self._seen = number if self._ramp is None else _AWAKE
+        while self._news:
+            self._notify(Event(t, "WARN", self._news.popleft()))
+
+    def _take(self, number: int, t: float) -> None:
+        try:
+            change = self._mailbox.take()
+            if change is None:
+                return
+            what = self._make(change, t)
+        except Exception as error:  # noqa: BLE001 - whatever is in the slot, the run goes on
+            self._mailbox.reply(number, Answer(FAILED, t))
+            self._notify(Event(t, "WARN", f"a change could not be applied: {error!r}"))
+            return
+        self._mailbox.reply(number, Answer(what, t))
+        if what == APPLIED:
+            sentence = f"{change.words}, applied at t = {t:.3f} s"
+            self._notify(Event(t, "INFO", sentence))
+            if len(self.made) < _KEPT:
+                self.made.append(sentence)
+
+    def _make(self, change: Change, t: float) -> int:
+        if change.reference is not None:
+            if self._trajectory.lowering:
+                return LOWERING
+            self._trajectory.change(t + self._delay, change.reference)
+        if change.tuning is not None:
+            cast("_Tuned", self._observer).retune(change.tuning)
+        if change.gains is not None:
+            self._ramp = _Ramp(cast("_Geared", self._controller), change.gains, t)
+        return APPLIED
+
+
+class _Tuned(Protocol):
+    """An observer of ours: a tuning is sent to no other."""
+
+    def retune(self, tuning: Tuning) -> None: ...
+
+
+class _Geared(Protocol):
+    """A controller of ours: gains are sent to no other."""
+
+    gains: Gains
+
+
+class _Ramp:
+    """Gains on their way."""
+
+    def __init__(self, controller: _Geared, wanted: Gains, t: float) -> None:
+        self._controller, self._wanted, self._t0 = controller, wanted, t
+        self._from = controller.gains
+
+    def over(self, t: float) -> bool:
+        """Set the gains of device time `t`, s; tell whether they are the wanted ones."""
+        s = min(max((t - self._t0) / RAMP, 0.0), 1.0)
+        kp, kd, compensation = (a + s * (b - a) for a, b in zip(self._from, self._wanted, strict=True))
+        self._controller.gains = Gains(kp, kd, compensation) if s < 1.0 else self._wanted
+        return s == 1.0

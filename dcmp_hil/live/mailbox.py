@@ -1,0 +1,117 @@
+"""The mailbox between control process and loop: one slot in shared memory, and nobody ever waits for it."""
+
+from __future__ import annotations
+
+import pickle
+import struct
+import zlib
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    import mmap
+
+    from dcmp_hil.live.change import Change
+
+_WORDS = 8  # of 8 bytes: asked, taken, answer, phase, length, check, length of the last words
+_ASKED, _TAKEN, _ANSWER, _PHASE, _LENGTH, _CHECK, _LAST = range(7)
+_TIME = struct.Struct("d")
+_TIME_AT, _LAST_AT, _SLOT_AT = 8 * _WORDS, 256, 4096
+SIZE = 1 << 16
+"""Bytes of a mailbox."""
+
+APPLIED, LOWERING, FAILED = 1, 2, 3
+"""Answers."""
+
+
+class Answer(NamedTuple):
+    """What became of a change."""
+
+    what: int  # APPLIED, LOWERING or FAILED
+    t: float  # s, device time
+
+
+class Mailbox:
+    """One slot for a change, one for its answer, and a few words about the run.
+
+    The loop reads one number a period. A change is written before its number is, an answer likewise.
+
+    Parameters
+    ----------
+    memory
+        Of `SIZE` bytes, zeros at first; None takes some that nobody shares.
+
+    Attributes
+    ----------
+    words
+        The numbers, `words[0]` being that of the newest change: what the loop looks at.
+    """
+
+    def __init__(self, memory: mmap.mmap | bytearray | None = None) -> None:
+        self.memory = bytearray(SIZE) if memory is None else memory
+        self.words = memoryview(self.memory)[: 8 * _WORDS].cast("q")
+
+    # ---------------------------------------------------------------- the side that asks
+
+    def put(self, change: Change) -> int:
+        """Put a change into the slot, whatever was in it; return its number.
+
+        Raises
+        ------
+        ConfigError
+            If it is too long for the slot.
+        """
+        data = pickle.dumps(change)
+        if len(data) > SIZE - _SLOT_AT:
+            raise ConfigError("The change is too long for its way to the loop. Change fewer keys at once.")
+        self.memory[_SLOT_AT : _SLOT_AT + len(data)] = data
+        self.words[_LENGTH], self.words[_CHECK] = len(data), zlib.crc32(data)
+        self.words[_ASKED] += 1
+        return self.words[_ASKED]
+
+    def answer(self, number: int) -> Answer | None:
+        """Return what became of the change of that number; None as long as nobody took it."""
+        if self.words[_TAKEN] != number:
+            return None
+        return Answer(self.words[_ANSWER], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))
+
+    def withdraw(self) -> None:
+        """Take back a change that was not taken."""
+        self.words[_LENGTH] = 0
+
+    @property
+    def phase(self) -> int:
+        """Where the run stands, as a place in the list of phases."""
+        return self.words[_PHASE]
+
+    @property
+    def last_words(self) -> str:
+        """How the run ended; empty while it has not."""
+        return bytes(self.memory[_LAST_AT : _LAST_AT + self.words[_LAST]]).decode("utf-8", "replace")
+
+    # ---------------------------------------------------------------- the loop's side
+
+    def take(self) -> Change | None:
+        """Return the change in the slot; None if it was withdrawn."""
+        data = self.memory[_SLOT_AT : _SLOT_AT + self.words[_LENGTH]]
+        if not data or zlib.crc32(data) != self.words[_CHECK]:
+            return None
+        change: Change = pickle.loads(data)  # noqa: S301 - written by our own child
+        return change
+
+    def reply(self, number: int, answer: Answer) -> None:
+        """Answer the change of that number."""
+        self.words[_ANSWER] = answer.what
+        _TIME.pack_into(self.memory, _TIME_AT, answer.t)
+        self.words[_TAKEN] = number
+
+    def tell_phase(self, phase: int) -> None:
+        """Say where the run stands."""
+        self.words[_PHASE] = phase
+
+    def tell_end(self, sentence: str) -> None:
+        """Say how the run ended."""
+        data = sentence.encode()[: _SLOT_AT - _LAST_AT]
+        self.memory[_LAST_AT : _LAST_AT + len(data)] = data
+        self.words[_LAST] = len(data)

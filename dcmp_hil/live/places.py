@@ -1,0 +1,83 @@
+"""Where the runs of this user listen: a socket each, in a folder that is nobody else's."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import struct
+from contextlib import suppress
+from pathlib import Path
+
+from dcmp_hil.errors import ConfigError
+
+_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
+_MINE = 0o700
+_LONGEST = 80  # characters: the path of a socket may have 107
+_PATIENCE = 0.5  # s to connect in
+
+
+def folder() -> Path:
+    """Return the folder of this user's sockets, made if need be.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be made, or belongs to somebody else.
+    """
+    base = os.environ.get("XDG_RUNTIME_DIR", "")
+    if len(base) > _LONGEST:
+        base = ""
+    place = Path(base) / "dcmp-hil" if base and Path(base).is_dir() else Path(f"/tmp/dcmp-hil-{os.getuid()}")  # noqa: S108 - its owner and mode are checked
+    try:
+        place.mkdir(mode=_MINE, exist_ok=True)
+        found = place.lstat()
+    except OSError as error:
+        raise ConfigError(
+            f"{place}: {error.strerror}. Set XDG_RUNTIME_DIR to a folder of your own."
+        ) from None
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+        raise ConfigError(
+            f"{place} is no folder of yours alone. Remove it, or set XDG_RUNTIME_DIR to one that is."
+        )
+    return place
+
+
+def socket_of(pid: int) -> Path:
+    """Return where the run of that process listens."""
+    return folder() / f"{pid}.sock"
+
+
+def running() -> list[int]:
+    """Return the process ids of the runs that listen, oldest first; what others left behind is removed."""
+    found: list[tuple[float, int]] = []
+    for path in folder().glob("*.sock"):
+        if not path.stem.isdigit():
+            continue
+        if _alive(path):
+            with suppress(OSError):
+                found.append((path.stat().st_mtime, int(path.stem)))
+        else:
+            path.unlink(missing_ok=True)
+    return [pid for _, pid in sorted(found)]
+
+
+def peer_of(connection: socket.socket) -> tuple[int, int]:
+    """Return process and user id of the other end."""
+    pid, uid, _ = _CREDENTIALS.unpack(
+        connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    )
+    return pid, uid
+
+
+def _alive(path: Path) -> bool:
+    """Whether somebody listens there; nobody's answer is waited for."""
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(_PATIENCE)
+        try:
+            probe.connect(str(path))
+        except (ConnectionRefusedError, FileNotFoundError):
+            return False
+        except OSError:  # a full queue: somebody is there, if slow
+            return True
+    return True

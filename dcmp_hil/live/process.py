@@ -1,0 +1,98 @@
+"""The control process as its run sees it: started before anything is armed, and never waited for."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from dcmp_hil.live.control import Setup
+from dcmp_hil.live.mailbox import SIZE, Mailbox
+from dcmp_hil.telemetry.shared import mapped, reserve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.config import Rig
+
+_LEAVING = 0.5  # s for it to leave in, at the end of a run
+_CODE = """
+import sys
+sys.path[:] = {path!r}
+from dcmp_hil.live.control import main
+main({line}, {setup}, {parent})
+"""
+
+
+class ControlProcess:
+    """Lets `dcmp-hil set`, `stop` and `panel` change a run, from a process that shares nothing with the loop.
+
+    Attributes
+    ----------
+    mailbox
+        For the loop to look at.
+    pid
+        Of the process; None while there is none.
+    """
+
+    def __init__(self) -> None:
+        self._file, self._setup = reserve(self, "mailbox"), reserve(self, "control")
+        self.mailbox = Mailbox(mapped(self._file, SIZE))
+        self.pid: int | None = None
+        self._line: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._closing = False
+        self._watch = threading.Thread(target=self._wait, name="control", daemon=True)
+        self._warn: Callable[[str], None]
+
+    def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
+        """Start it; it comes up by itself, in half a second. See `Control`."""
+        if ring is None:
+            return
+        self._warn = warn
+        os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring)))
+        self._line, theirs = socket.socketpair()
+        with theirs:
+            code = _CODE.format(path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid())
+            try:
+                self._process = subprocess.Popen(  # noqa: S603 - our own code
+                    [sys.executable, "-c", code],
+                    pass_fds=[theirs.fileno(), self._setup, self._file, ring],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                    start_new_session=True,  # Ctrl-C is the run's to hear
+                )
+            except OSError as error:
+                warn(f"The control process could not be started ({error}): this run cannot be changed.")
+                return
+        self.pid = self._process.pid
+        self._watch.start()
+
+    def close(self, last_words: str) -> None:
+        """Say how the run ended, and have it leave."""
+        self._closing = True
+        self.mailbox.tell_end(last_words)
+        if self._line is not None:
+            self._line.close()
+        if self._process is not None:
+            self._watch.join(_LEAVING)
+            if self._watch.is_alive():
+                self._process.kill()
+                self._watch.join(_LEAVING)
+
+    def _wait(self) -> None:
+        """Wait for its end, on a thread that the kernel wakes only then."""
+        assert self._process is not None  # noqa: S101 - started after it
+        with suppress(OSError):
+            code = self._process.wait()
+            if not self._closing:
+                why = self.mailbox.last_words or f"exit code {code}"
+                self._warn(
+                    f"The control process ended ({why}): `dcmp-hil set`, `stop` and `panel` reach this run "
+                    "no more; it goes on, and Ctrl-C ends it."
+                )

@@ -1,0 +1,140 @@
+"""What may change in a run: gains and reference, checked by the rules of rig.toml; no limit ever."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dcmp_hil import observers
+from dcmp_hil.config import change_rig
+from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.words import toml_value
+from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.live.change import Change
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
+from dcmp_hil.references.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.config import Rig
+
+_CONTROLLER = ("kind", "kp_1_s2", "kd_1_s")
+_OBSERVER = ("mu0_rad_s", "M_rad_s3", "L1_1_s", "L2_1_s2")
+_NOT_OF_REFERENCE = ("soft_start_s",)  # it is over, or would jump
+
+
+def settable(rig: Rig) -> list[str]:
+    """List the dotted keys that may change while this rig runs."""
+    keys: list[str] = []
+    if isinstance(rig.controller, PdSettings):
+        keys += [f"controller.{key}" for key in _CONTROLLER]
+    if isinstance(rig.observer, SuperTwistingSettings):
+        keys += [f"observer.{key}" for key in _OBSERVER]
+    if isinstance(rig.reference, Table):
+        return [*keys, "reference.kind"]
+    fields = type(rig.reference).model_fields
+    return [*keys, *(f"reference.{key}" for key in fields if key not in _NOT_OF_REFERENCE)]
+
+
+def value_of(rig: Rig, key: str) -> Any:
+    """Return what a settable key is; what the rig leaves to a rule is worked out."""
+    section, name = key.split(".")
+    value = getattr(getattr(rig, section), name)
+    if value is None:
+        counts = rig.encoder.counts
+        return bandwidth_floor(counts, rig.period) if name == "mu0_rad_s" else slope_bound(counts)
+    return value
+
+
+def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
+    """Check a change and work it out.
+
+    Parameters
+    ----------
+    rig
+        As it runs.
+    overrides
+        `key=value` in dotted form.
+
+    Returns
+    -------
+    tuple
+        The rig as it runs after the change, and what the loop is sent.
+
+    Raises
+    ------
+    ConfigError
+        With every fault found: those of rig.toml, and keys that cannot change in a run.
+    """
+    if not overrides:
+        raise ConfigError("Nothing to change. Write KEY=VALUE, such as controller.kp_1_s2=5200.")
+    keys = [override.partition("=")[0].strip() for override in overrides]
+    _refuse(rig, [key for key in keys if _known(rig, key) and key not in settable(rig)])
+    after = change_rig(rig, overrides)
+    if isinstance(after.reference, Table) and after.reference != rig.reference:
+        raise ConfigError(
+            'reference.kind: "csv" is read before a run, not in one. Start another run with it.'
+        )
+    _refuse(after, [key for key in keys if key not in settable(after)])
+    if type(after.controller) is not type(rig.controller) or type(after.observer) is not type(rig.observer):
+        raise ConfigError(
+            "A class of your own takes the place of no other in a run. Start another run with it."
+        )
+    return after, _worked_out(rig, after)
+
+
+def _refuse(rig: Rig, keys: list[str]) -> None:
+    if keys:
+        raise ConfigError(
+            *(f"{key} cannot be changed in a run{_own(rig, key)}." for key in keys),
+            f"These can: {', '.join(settable(rig))}.",
+        )
+
+
+def _own(rig: Rig, key: str) -> str:
+    section = getattr(rig, key.partition(".")[0], None)
+    return f": {section.kind} is a class of your own" if isinstance(section, Custom) else ""
+
+
+def _known(rig: Rig, key: str) -> bool:
+    """Whether it is a key of this rig, or a table."""
+    inner: Any = rig
+    for part in key.split("."):
+        if part not in getattr(type(inner), "model_fields", {}):
+            return False
+        inner = getattr(inner, part)
+    return True
+
+
+def _worked_out(before: Rig, after: Rig) -> Change:
+    words = in_words(before, after)
+    gains = tuning = None
+    if isinstance(after.controller, PdSettings) and after.controller != before.controller:
+        gains = after.controller.gains
+    if isinstance(after.observer, SuperTwistingSettings) and after.observer != before.observer:
+        tuning = after.observer.tuning(
+            observers.Setting(after.model.values(), after.period, after.encoder.counts)
+        )
+    reference = after.reference if after.reference != before.reference else None
+    return Change(words, gains, tuning, reference)
+
+
+def in_words(before: Rig, after: Rig) -> str:
+    """Say what is different: "controller.kp_1_s2: 4000 -> 5200"."""
+    old = {key: value_of(before, key) for key in settable(before)}
+    new = {key: value_of(after, key) for key in settable(after)}
+    said = [
+        f"{key}: {_shown(old[key])} -> {_shown(value)}" if key in old else f"{key} = {_shown(value)}"
+        for key, value in new.items()
+        if old.get(key) != value
+    ]
+    return ", ".join(said) or "nothing is different"
+
+
+def _shown(value: Any) -> str:
+    """Write a value so that it comes back the same: a recording is run again by these words."""
+    if not isinstance(value, float):
+        return toml_value(value)
+    short = f"{value:.6g}"
+    return short if float(short) == value else repr(value)

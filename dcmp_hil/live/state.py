@@ -1,0 +1,63 @@
+"""A run in a few numbers and words, for whoever looks on from outside."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from dcmp_hil.faults import meaning_of
+from dcmp_hil.supervisor import Phase
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dcmp_hil.config import Rig
+
+_PHASES = tuple(phase.value for phase in Phase)
+
+
+def state_of(row: Mapping[str, float], phase: int, rig: Rig) -> dict[str, Any]:
+    """Return what JSON can hold.
+
+    Parameters
+    ----------
+    row
+        The newest of the ring; empty before the first.
+    phase
+        A place in the list of phases.
+    rig
+        As it runs.
+    """
+    state = {
+        "rig": rig.name,
+        "t_s": row.get("t"),
+        "phase": _PHASES[phase] if 0 <= phase < len(_PHASES) else "unknown",
+        "position_rad": row.get("position"),
+        "velocity_rad_s": row.get("velocity_estimate"),
+        "reference_rad": row.get("position_reference"),
+        "voltage_V": row.get("voltage_applied"),
+        "voltage_limit_V": rig.amplifier.limit,
+        "disturbance_rad_s2": row.get("disturbance_estimate"),
+        "error_mrad": _error_mrad(row),
+        "lateness_us": 1e6 * row.get("lateness", math.nan),
+        "fault": _fault(int(row.get("fault", 0.0))),
+    }
+    return {key: _plain(value) for key, value in state.items()}
+
+
+def _error_mrad(row: Mapping[str, float]) -> float | None:
+    """Return position minus reference at one instant; None before there is anything to track."""
+    if not row or row["t"] < row["began"]:
+        return None
+    return 1e3 * (row["position"] - row["position_reference"])
+
+
+def _fault(code: int) -> str:
+    if not code:
+        return ""
+    meaning = meaning_of(code)
+    return f"{meaning.sentence}. {meaning.remedy}"
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

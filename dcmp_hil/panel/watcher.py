@@ -1,0 +1,78 @@
+"""Keeps up with the run: its newest state, its end, and the next run."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.live.places import running, socket_of
+
+_LOOK = 0.5  # s between two looks for a run
+_SILENT = 1.0  # s without a state after which the page says so
+_LINE = 1 << 16  # bytes
+
+
+class Watcher:
+    """The newest that is known of a run.
+
+    Parameters
+    ----------
+    pid
+        Of the run that is meant; None takes the newest, and the next when it has ended.
+
+    Attributes
+    ----------
+    state
+        What the page is shown.
+    run
+        Process id of the run that is watched; None while there is none.
+    """
+
+    def __init__(self, pid: int | None) -> None:
+        self._wanted = pid
+        self.run: int | None = None
+        self.state: dict[str, Any] = {"connection": "none"}
+
+    async def watch(self) -> None:
+        """Watch one run after the other, for ever."""
+        while True:
+            pid = await asyncio.to_thread(self._find)
+            if pid is not None:
+                with suppress(OSError, ValueError):
+                    await self._follow(pid)
+                self.run = None
+                if self.state["connection"] != "ended":
+                    self.state = {"connection": "ended", "ended": "its control process is gone."}
+            await asyncio.sleep(_LOOK)
+
+    def _find(self) -> int | None:
+        try:
+            runs = running()
+        except ConfigError:
+            return None
+        if self._wanted is not None:
+            return self._wanted if self._wanted in runs else None
+        return runs[-1] if runs else None
+
+    async def _follow(self, pid: int) -> None:
+        reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE)
+        self.run = pid
+        try:
+            writer.write(b'{"do": "watch"}\n')
+            while line := await self._next_line(reader):
+                state = json.loads(line)
+                self.state = {"connection": "ended" if "ended" in state else "live", **state}
+        finally:
+            writer.close()
+
+    async def _next_line(self, reader: asyncio.StreamReader) -> bytes:
+        """Return the next line; while none comes, the page is told."""
+        waiting = asyncio.ensure_future(reader.readline())
+        while True:
+            done, _ = await asyncio.wait({waiting}, timeout=_SILENT)
+            if done:
+                return waiting.result()
+            self.state = {**self.state, "connection": "silent"}

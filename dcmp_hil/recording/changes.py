@@ -1,0 +1,43 @@
+"""The changes that were made while a run went on, found again in its events."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from dcmp_hil.live.settable import changed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.live.change import Change
+    from dcmp_hil.values import Event
+
+_APPLIED = re.compile(r"(.*), applied at t = [0-9.]+ s")
+_ONE = re.compile(r"([a-z_]+\.\w+)(?:: .*? -> | = )(.*?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
+
+
+def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
+    """Return each change with the device time of the period after which it was made, s.
+
+    Parameters
+    ----------
+    events
+        Of the run.
+    rig
+        As the run began.
+
+    Raises
+    ------
+    ConfigError
+        If one of them cannot be made with this rig.
+    """
+    found = []
+    for event in events:
+        applied = _APPLIED.fullmatch(event.text)
+        overrides = [f"{key}={value}" for key, value in _ONE.findall(applied[1])] if applied else []
+        if overrides:
+            rig, change = changed(rig, overrides)
+            found.append((event.t, change))
+    return found

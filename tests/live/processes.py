@@ -1,0 +1,70 @@
+"""Real runs that listen, in a folder of the test's own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.live.client import status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import pytest
+
+BOUND = 60.0  # s: generous, these machines are shared
+
+
+@contextmanager
+def own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Keep sockets where no other run's are; the name is short, for a socket's may have 107 characters."""
+    with tempfile.TemporaryDirectory(prefix="dcmp", dir="/tmp") as folder:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        yield Path(folder)
+
+
+@contextmanager
+def started(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Start `dcmp-hil` with arguments; whatever becomes of it, it is gone in the end."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dcmp_hil", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=BOUND)
+
+
+def until(done: Callable[[], object], what: str, within: float = BOUND) -> None:
+    """Wait until something is true."""
+    deadline = time.monotonic() + within
+    while not done():
+        assert time.monotonic() < deadline, f"never: {what}"
+        time.sleep(0.02)
+
+
+def until_running(process: subprocess.Popen[str]) -> None:
+    """Wait until a run has full authority."""
+    until(lambda: process.poll() is not None or _runs(process.pid), "the run got under way")
+    assert process.poll() is None, process.communicate()[1]
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return bool(status(pid).get("phase") == "running")
+    except ConfigError:
+        return False

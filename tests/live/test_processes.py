@@ -1,0 +1,164 @@
+"""Real runs, changed and stopped from outside; a control process that is frozen, killed, or left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.live import client, places
+from tests.live.processes import BOUND, own_folder, started, until, until_running
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+_RUN = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0", "--json", "figures.json")
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with own_folder(monkeypatch):
+        yield
+
+
+def _control_of(pid: int) -> int:
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(str(places.socket_of(pid)))
+        return places.peer_of(connection)[0]
+
+
+def _gone(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
+    with started(tmp_path, *_RUN) as run:
+        until_running(run)
+        assert client.find_run() == run.pid
+        said = client.change(run.pid, ["controller.kp_1_s2=5200", "reference.amplitude_rad=0.7"])
+        assert said.startswith(
+            "controller.kp_1_s2: 4000 -> 5200, reference.amplitude_rad: 1 -> 0.7, applied at"
+        )
+        values = {knob["key"]: knob["value"] for knob in client.status(run.pid)["knobs"]}
+        assert values["controller.kp_1_s2"] == 5200.0
+        for refused, why in (
+            ("controller.kp=3", "kp_1_s2"),
+            ("amplifier.voltage_limit_V=20", "cannot be changed in a run"),
+            ("supervisor.monitors=finite", "cannot be changed in a run"),
+            ("controller.kd_1_s=-1", "at least 0"),
+            ("reference.kind=csv", "file"),
+            ("rubbish", "KEY=VALUE"),
+        ):
+            with pytest.raises(ConfigError, match=why):
+                client.change(run.pid, [refused])
+        control = _control_of(run.pid)
+        client.stop(run.pid)
+        with suppress(ConfigError):  # it may have left already
+            client.stop(run.pid)  # a second one changes nothing
+        run.communicate(timeout=BOUND)
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert run.returncode == 0
+    assert figures["ended_by"] == "SIGINT"
+    assert len(figures["changes"]) == 1
+    until(lambda: _gone(control), "the control process left", within=1.0)
+    assert places.running() == []
+
+
+def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> None:
+    with started(tmp_path, *_RUN) as run:
+        until_running(run)
+        control = _control_of(run.pid)
+        os.kill(control, signal.SIGSTOP)
+        client.stop(run.pid)
+        run.communicate(timeout=BOUND)
+    assert run.returncode == 0
+    assert _gone(control)
+
+
+def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path) -> None:
+    with started(tmp_path, *_RUN) as run:
+        until_running(run)
+        os.kill(_control_of(run.pid), signal.SIGKILL)
+        until(lambda: not places.running(), "its socket was cleaned up")
+        assert run.poll() is None
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=BOUND)
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert run.returncode == 0
+    assert err.count("The control process ended") == 1
+    assert sum("The control process ended" in trouble for trouble in figures["troubles"]) == 1
+
+
+def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
+    with started(tmp_path, *_RUN) as run:
+        until_running(run)
+        control = _control_of(run.pid)
+        run.kill()
+        run.communicate(timeout=BOUND)
+        until(lambda: _gone(control), "the control process left", within=1.0)
+    assert places.running() == []
+
+
+def test_run_says_why_nobody_listens_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
+    places.folder().chmod(0o755)
+    with started(tmp_path, *_RUN[:-4], "--duration", "3") as run:
+        _, err = run.communicate(timeout=BOUND)
+    assert run.returncode == 0
+    assert "The control process ended" in err
+    assert "is no folder of yours alone" in err
+
+
+def test_nobody_listens_when_that_is_wanted(tmp_path: Path) -> None:
+    with started(tmp_path, *_RUN[:-4], "--duration", "0.5", "--no-control") as run:
+        run.communicate(timeout=BOUND)
+    assert run.returncode == 0
+    assert not any(places.folder().iterdir())
+
+
+def test_commands_say_so_when_there_is_no_run() -> None:
+    for arguments in (["set", "controller.kp_1_s2=5000"], ["stop"], ["status"], ["stop", "--run", "1"]):
+        done = subprocess.run(
+            [sys.executable, "-c", "from dcmp_hil.cli import main; main()", *arguments],
+            capture_output=True,
+            text=True,
+            timeout=BOUND,
+            check=False,
+        )
+        assert done.returncode == 2
+        assert len(done.stderr.splitlines()) == 1
+        assert "No run" in done.stderr
+
+
+def test_several_runs_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "running", lambda: [11, 12])
+    assert client.find_run(12) == 12
+    with pytest.raises(ConfigError, match=r"11, 12.*--run PID"):
+        client.find_run()
+
+
+def test_folder_is_refused_when_others_may_use_it() -> None:
+    places.folder().chmod(0o755)
+    with pytest.raises(ConfigError, match="no folder of yours alone"):
+        places.folder()
+
+
+def test_what_a_dead_run_left_behind_is_removed() -> None:
+    left = places.socket_of(4_000_000)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(left))
+    assert left.exists()
+    assert places.running() == []
+    assert not left.exists()
