@@ -86,7 +86,7 @@ class Server:
             OSError,
             ValueError,
             RecursionError,
-        ):  # gone, or no line of JSON: nothing that is worth an answer
+        ):  # gone, or no line of JSON
             pass
         finally:
             self._watchers.discard(writer)
