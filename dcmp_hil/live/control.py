@@ -82,7 +82,11 @@ class Server:
                 return
             while line := await reader.readline():
                 await self._answer(json.loads(line), writer)
-        except (OSError, ValueError):  # gone, or no line of JSON: nothing that is worth an answer
+        except (
+            OSError,
+            ValueError,
+            RecursionError,
+        ):  # gone, or no line of JSON
             pass
         finally:
             self._watchers.discard(writer)

@@ -82,8 +82,12 @@ def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> No
         until_running(run)
         control = _control_of(run.pid)
         os.kill(control, signal.SIGSTOP)
-        client.stop(run.pid)
-        run.communicate(timeout=BOUND)
+        try:
+            client.stop(run.pid)
+            run.wait(timeout=BOUND)
+        finally:
+            with suppress(ProcessLookupError):
+                os.kill(control, signal.SIGCONT)
     assert run.returncode == 0
     assert _gone(control)
 

@@ -1,0 +1,125 @@
+"""The control process's server, in this process: who is answered, and with what."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dcmp_hil.live import control
+from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
+from dcmp_hil.telemetry.ring import Ring, size_of
+from dcmp_hil.telemetry.shared import mapped, reserve
+from dcmp_hil.values import Truth
+from tests.helpers import bench, cycle
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_ROWS = 16
+
+
+class _Rig:
+    """What a run would share with its control process, and a loop that answers as it is told to."""
+
+    def __init__(self) -> None:
+        files = [reserve(self, "mailbox"), reserve(self, "ring")]
+        self.mailbox = Mailbox(mapped(files[0], SIZE))
+        self.ring = Ring(_ROWS, mapped(files[1], size_of(_ROWS)))
+        setup = control.Setup(bench(), *files)
+        self.server = control.Server(setup, Mailbox(mapped(files[0], SIZE)), os.getpid())
+        self.answer: int | None = APPLIED
+
+    async def ask(self, place: Path, *requests: Any) -> list[Any]:
+        """Send lines, return the answers."""
+        async with await asyncio.start_unix_server(self.server.serve, place):
+            reader, writer = await asyncio.open_unix_connection(place)
+            loop = asyncio.ensure_future(self._loop())
+            answers = []
+            try:
+                for request in requests:
+                    line = request if isinstance(request, bytes) else json.dumps(request).encode()
+                    writer.write(line + b"\n")
+                    reply = b""
+                    with suppress(ConnectionError):
+                        reply = await asyncio.wait_for(reader.readline(), 5.0)
+                    answers.append(json.loads(reply) if reply else None)
+            finally:
+                loop.cancel()
+                writer.close()
+            return answers
+
+    async def _loop(self) -> None:
+        while True:
+            if self.answer is not None and self.mailbox.answer(self.mailbox.words[0]) is None:
+                self.mailbox.reply(self.mailbox.words[0], Answer(self.answer, 3.25))
+            await asyncio.sleep(0.001)
+
+
+@pytest.fixture
+def rig() -> _Rig:
+    return _Rig()
+
+
+def _change(*overrides: str) -> dict[str, Any]:
+    return {"do": "set", "changes": list(overrides)}
+
+
+def test_change_is_read_back_and_what_is_applied_is_the_new_state(rig: _Rig, tmp_path: Path) -> None:
+    said, refused, state = asyncio.run(
+        rig.ask(
+            tmp_path / "s",
+            _change("controller.kp_1_s2=5200"),
+            _change("controller.kd_1_s=fast"),
+            {"do": "status"},
+        )
+    )
+    assert said == {"ok": True, "said": "controller.kp_1_s2: 4000 -> 5200, applied at 3.250 s", "t": 3.25}
+    assert refused["ok"] is False
+    values = {knob["key"]: knob["value"] for knob in state["knobs"]}
+    assert (values["controller.kp_1_s2"], values["controller.kd_1_s"]) == (5200.0, 130.0)
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"), [(LOWERING, "being lowered"), (3, "events say why"), (None, "within 1 s")]
+)
+def test_change_that_was_not_taken_is_not_shown_as_applied(
+    rig: _Rig, tmp_path: Path, answer: int | None, why: str
+) -> None:
+    rig.answer = answer
+    said, state = asyncio.run(rig.ask(tmp_path / "s", _change("controller.kp_1_s2=5200"), {"do": "status"}))
+    assert said["ok"] is False
+    assert why in said["said"]
+    assert {knob["key"]: knob["value"] for knob in state["knobs"]}["controller.kp_1_s2"] == 4000.0
+    assert rig.mailbox.take() is None or answer is not None  # withdrawn: nobody applies it later
+
+
+def test_state_is_the_newest_period_in_numbers_and_words(rig: _Rig, tmp_path: Path) -> None:
+    (empty,) = asyncio.run(rig.ask(tmp_path / "s", {"do": "status"}))
+    assert (empty["t_s"], empty["phase"], empty["fault"]) == (None, "arming", "")
+    for k in range(3):
+        rig.ring.push(cycle(0.001 * k, position=0.5, applied=2.0), Truth(0.0, 0.0, 0.0))
+    rig.mailbox.tell_phase(4)
+    (state,) = asyncio.run(rig.ask(tmp_path / "t", {"do": "status"}))
+    assert (state["t_s"], state["position_rad"], state["voltage_V"]) == (0.002, 0.5, 2.0)
+    assert state["phase"] == "running"
+
+
+def test_another_user_is_not_answered(rig: _Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "peer_of", lambda _: (1, os.getuid() + 1))
+    assert asyncio.run(rig.ask(tmp_path / "s", {"do": "status"})) == [None]
+
+
+@pytest.mark.parametrize("line", [b"nonsense", b"\xff\xfe", b"[" * 5000])
+def test_what_is_no_request_ends_the_connection(rig: _Rig, tmp_path: Path, line: bytes) -> None:
+    assert asyncio.run(rig.ask(tmp_path / "s", line)) == [None]
+
+
+@pytest.mark.parametrize("changes", [None, "a=1", [1], {"a": 1}])
+def test_change_that_is_no_list_of_texts_is_refused(rig: _Rig, tmp_path: Path, changes: object) -> None:
+    (said,) = asyncio.run(rig.ask(tmp_path / "s", {"do": "set", "changes": changes}))
+    assert said == {"ok": False, "said": "A change is a list of KEY=VALUE."}
