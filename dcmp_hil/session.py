@@ -228,6 +228,11 @@ class Session:
             said = "granted" if grant.granted else grant.refusal
             self._recorder.event(Event(0.0, "INFO", f"{grant.what}: {said}"))
 
+    @property
+    def telemetry_pid(self) -> int | None:
+        """The telemetry process; None where there is none, or it has not come up."""
+        return self._apart.pid if self._apart else None
+
     def result(self) -> Result:
         """Return what there is, complete or not."""
         return Result(

@@ -21,6 +21,7 @@ from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Cycle, Sample
 from tools.bench_lateness import Lateness, lateness, period_us
+from tools.bench_telemetry import Endurance, endurance, record_us
 from tools.bench_wire import codec_us, round_trips
 
 if TYPE_CHECKING:
@@ -129,6 +130,7 @@ def _rows() -> list[Row]:
         ),
         _row("encode a DRIVE and decode a SAMPLE, COBS", "us", "<= 2", codec_us),
         _row("one period on the host, bytes to bytes, with its record", "us", "<= 12", period_us),
+        _row("of that, for telemetry: one period recorded", "us", "<= 2", record_us),
         *_wire_rows(),
         _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
         _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
@@ -152,11 +154,24 @@ def _lateness_rows(found: Lateness) -> list[Row]:
     return [
         _row_of(f"lateness at {at}, C clock_nanosleep", found.c, "us", ""),
         _row_of(f"lateness at {at}, the loop", found.ours, "us", ""),
-        _row_of(f"lateness at {at}, the loop with a recording", found.recorded, "us", ""),
+        _row_of(f"lateness at {at}, recordings and dashboard on", found.recorded, "us", ""),
         Row("ratio of the medians, the loop to C", *found.ratio(found.ours), "x", found.goal),
-        Row("ratio of the medians, with a recording", *found.ratio(found.recorded), "x", found.goal),
+        Row("ratio of the medians, all on, to C", *found.ratio(found.recorded), "x", found.goal),
+        Row("ratio of the medians, all on to all off", *found.dashboard, "x", "<= 1.1"),
         _row_of("mean rate error", found.rate_error, "%", "+-0.01"),
         _row_of("drift", found.drift, "us/s", "0"),
+    ]
+
+
+def _endurance_rows(found: Endurance) -> list[Row]:
+    """Rows of a long run at 10 kHz with recordings and dashboard."""
+    at = f"{found.rate / 1e3:g} kHz, all on"
+    return [
+        _row_of(f"{at}: periods that telemetry lost", [found.dropped], "", "0"),
+        _row_of(f"{at}: memory of its process", found.resident_mb, "MB", ""),
+        _row_of(f"{at}: what that grew in the second half", [found.growth_mb], "MB", "<= 10"),
+        _row_of(f"{at}: run.mcap a minute", [found.mcap_mb_a_minute], "MB", ""),
+        _row_of(f"{at}: run.rrd a minute", [found.rrd_mb_a_minute], "MB", ""),
     ]
 
 
@@ -180,11 +195,14 @@ def main() -> None:
     parser.add_argument("--json", type=Path, default=Path("bench.json"), metavar="FILE")
     parser.add_argument("--seconds", type=float, default=3.0, help="of each run that measures lateness")
     parser.add_argument("--rounds", type=int, default=10, help="of runs that measure lateness, in turn")
+    parser.add_argument("--endurance", type=float, default=60.0, help="s at 10 kHz with all on; 0: none")
     asked = parser.parse_args()
     target: Path = asked.json
     rows = _rows()
     for rate in (1000.0, 10_000.0):
         rows += _lateness_rows(lateness(rate, asked.rounds, asked.seconds))
+    if asked.endurance > 0.0:
+        rows += _endurance_rows(endurance(seconds=asked.endurance))
     figures = [_figures(step) for step in (20.0, 200.0, 500.0)]
     write = sys.stdout.write
     write(f"{'':56}{'median':>10}{'min':>10}{'max':>10}  unit  goal\n")

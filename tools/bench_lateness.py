@@ -12,7 +12,6 @@ import time
 from collections import deque
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,7 @@ from dcmp_hil.session import Session
 from dcmp_hil.wire import cobs
 from sim_backend.backend import SimBackend
 from sim_backend.board import Board
+from tools.bench_telemetry import everything
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.wire.frame import Frame
 
 _SPREAD = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
@@ -88,7 +87,7 @@ class Lateness:
     rate: float  # Hz
     c: list[float]  # us, p99.9
     ours: list[float]
-    recorded: list[float]  # us, p99.9, with a recording to a file
+    recorded: list[float]  # us, p99.9, with recordings and the dashboard served
     rate_error: list[float]  # %, mean rate over the nominal one, less 1
     drift: list[float]  # us/s, from the medians of the first and the last tenth
 
@@ -103,6 +102,12 @@ class Lateness:
         return statistics.median(runs) / statistics.median(self.c), min(pairs), max(pairs)
 
     @property
+    def dashboard(self) -> tuple[float, float, float]:
+        """The ratio of the medians with recordings and dashboard to those without, smallest and largest."""
+        pairs = [one / other for one, other in zip(self.recorded, self.ours, strict=True)]
+        return statistics.median(self.recorded) / statistics.median(self.ours), min(pairs), max(pairs)
+
+    @property
     def goal(self) -> str:
         """What is asked of the ratio, or why nothing can be."""
         if self.c_spread > _SPREAD:
@@ -111,7 +116,7 @@ class Lateness:
 
 
 def lateness(rate: float, rounds: int, seconds: float) -> Lateness:
-    """Let C, the loop, and the loop with a recording run in turn."""
+    """Let C, the loop, and the loop with recordings and dashboard run in turn."""
     found = Lateness(rate, [], [], [], [], [])
     with _compiled() as program:
         for _ in range(rounds):
@@ -188,16 +193,9 @@ def child(rate: float, seconds: float, record: bool) -> None:
     """Run the loop at the wall's pace, under what the system grants; write how late each sleep ended, ns."""
     rig = load_rig("bench-1khz", [f"loop.rate_hz={rate}", "backend.kind=tools.bench_lateness:watched"])
     with tempfile.TemporaryDirectory() as folder:
-        sinks = [_recording(rig, Path(folder) / "run.rrd")] if record else []
+        sinks = everything(rig, Path(folder)) if record else []
         Session(rig, duration=seconds, sinks=sinks, keep_columns=False).run()
     sys.stdout.buffer.write(np.array(_late_ns, np.int64).tobytes())
-
-
-def _recording(rig: Rig, file: Path) -> SinkMaker:
-    from dcmp_hil.telemetry.rerun_sink import RerunSink
-    from dcmp_hil.telemetry.rig_view import view_of
-
-    return partial(RerunSink, rig=view_of(rig), record=file, viewer="none")
 
 
 # ---------------------------------------------------------------- what a period costs

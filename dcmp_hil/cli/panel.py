@@ -17,20 +17,36 @@ def panel(
     viewer: Annotated[
         str, typer.Option(metavar="URL", help="A web viewer that runs already, shown in the page.")
     ] = "",
+    web: Annotated[
+        bool, typer.Option("--web", help="Show the dashboard of a run with --viewer serve in the page.")
+    ] = False,
 ) -> None:
     """Serve a page for this machine's browser: gains, reference, what was applied, and STOP.
 
     It finds the newest run by itself, and the next one when that has ended. Only somebody who has the
     address that is printed, with its token, may use it.
     """
-    import asyncio
-    from contextlib import suppress
-
     from dcmp_hil.errors import ConfigError
 
     parts = urlsplit(viewer)
     if viewer and (parts.scheme not in {"http", "https"} or not parts.netloc):
         raise ConfigError(f"--viewer {viewer}: expected a URL such as http://127.0.0.1:9090.")
+    if web:
+        from dcmp_hil.cli.viewing import find_served
+        from dcmp_hil.cli.watching import pages
+
+        with pages(find_served()) as address:
+            _serve(port, run, address)
+    else:
+        _serve(port, run, viewer)
+
+
+def _serve(port: int, run: int | None, viewer: str) -> None:
+    import asyncio
+    from contextlib import suppress
+
+    from dcmp_hil.errors import ConfigError
+
     try:
         from dcmp_hil.panel.server import Panel
     except ImportError:

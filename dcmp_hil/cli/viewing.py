@@ -22,7 +22,7 @@ def attach(port: int | None, *, web: bool) -> None:
     ConfigError
         If nothing is served there, or there are several, or there is no display for a window.
     """
-    place = _find() if port is None else port
+    place = find_served() if port is None else port
     if not window.speaks_http2(place, _LOOK):
         raise ConfigError(
             f"Nobody serves a run on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
@@ -41,7 +41,14 @@ def attach(port: int | None, *, web: bool) -> None:
         console.note(f"opened {window.proxy_url(place)}; close the window when you like, the run goes on")
 
 
-def _find() -> int:
+def find_served() -> int:
+    """Return the port of the only run that is served on this computer.
+
+    Raises
+    ------
+    ConfigError
+        If there is none, or there are several.
+    """
     ports = window.served()
     if not ports:
         raise ConfigError("No run is served on this computer. Start one with: dcmp-hil run --viewer serve")

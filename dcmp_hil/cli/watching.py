@@ -48,6 +48,16 @@ def watched(viewer: Viewer) -> Iterator[tuple[Viewer, int]]:
 @contextmanager
 def web_viewer(port: int) -> Iterator[None]:
     """Serve the web viewer of what is served on `port`, and tell its address; without it life goes on."""
+    with pages(port) as address:
+        if address:
+            console.note(f"web viewer: {address}")
+            open_browser(address)
+        yield
+
+
+@contextmanager
+def pages(port: int) -> Iterator[str]:
+    """Serve the web viewer of what is served on `port`; yield its address, nothing where that fails."""
     process, problem = None, ""
     web_port = window.free_port(window.WEB_PORT)
     if web_port is None:
@@ -59,14 +69,10 @@ def web_viewer(port: int) -> Iterator[None]:
             problem = str(error)
         else:
             problem = "" if window.answers(web_port, _START) else "its pages are not served"
-    if problem or web_port is None:
+    if problem:
         console.warn(f"No web viewer ({problem}); to watch: dcmp-hil view")
-    else:
-        address = window.web_url(web_port, port)
-        console.note(f"web viewer: {address}")
-        open_browser(address)
     try:
-        yield
+        yield "" if problem or web_port is None else window.web_url(web_port, port)
     finally:
         if process is not None:
             process.terminate()

@@ -1,0 +1,117 @@
+"""What telemetry costs the loop, and how it bears 10 kHz with everything on."""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import threading
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dcmp_hil import load_rig
+from dcmp_hil.assembly import assemble
+from dcmp_hil.cli.onlookers import dashboard, recording
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.session import Session
+from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.viewer import free_port
+from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing
+
+if TYPE_CHECKING:
+    from dcmp_hil.config import Rig
+    from dcmp_hil.telemetry.makers import SinkMaker
+
+_PORT = 29_000
+_RECORDS, _ROUNDS = 2000, 25
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance:
+    """What a long run with everything on came to."""
+
+    rate: float  # Hz
+    dropped: int  # periods
+    resident_mb: list[float]  # MB of the telemetry process, a second each
+    mcap_mb_a_minute: float
+    rrd_mb_a_minute: float
+
+    @property
+    def growth_mb(self) -> float:
+        """How much larger the last quarter was than the second."""
+        quarter = max(1, len(self.resident_mb) // 4)
+        second, last = self.resident_mb[quarter : 2 * quarter], self.resident_mb[-quarter:]
+        return statistics.median(last) - statistics.median(second or last)
+
+
+def everything(rig: Rig, folder: Path) -> list[SinkMaker]:
+    """Return who looks on at most: the run's own recording, the dashboard in a file and served."""
+    port = free_port(_PORT)
+    if port is None:
+        raise OSError(f"no free port from {_PORT} on")
+    return [
+        partial(recording, folder / "run.mcap", rig.period, about(rig), rig_json(rig)),
+        partial(dashboard, view_of(rig), folder / "run.rrd", "serve", port),
+    ]
+
+
+def record_us() -> float:
+    """Return the median cost of one call of `record`: ring, black box, link."""
+    rig = load_rig("bench-1khz", ["backend.kind=sim-board"])
+    line, recorder = assemble(rig, SimulatedClock(), [], in_line=False)
+    del line
+    cycle = Cycle(
+        Sample(1.0, 0.5, 1.0),
+        Estimate(0.5, 0.1, 2.0),
+        Reference(0.5, 0.1, 0.0),
+        1.0,
+        1.0,
+        Timing(1e-3, 0.0, 1e-5),
+    )
+    costs = []
+    for _ in range(_ROUNDS):
+        began = time.perf_counter()
+        for _ in range(_RECORDS):
+            recorder.record(cycle)
+        costs.append(1e6 * (time.perf_counter() - began) / _RECORDS)
+    return statistics.median(costs)
+
+
+def endurance(rate: float = 10_000.0, seconds: float = 60.0) -> Endurance:
+    """Run at a rate with everything on; look at the telemetry process once a second."""
+    rig = load_rig("bench-1khz", [f"loop.rate_hz={rate}"])
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        session = Session(rig, duration=seconds, sinks=everything(rig, folder), keep_columns=False)
+        watch = _Memory(session)
+        watch.start()
+        session.run()
+        watch.ended.set()
+        watch.join()
+        result = session.result()
+        sizes = [60e-6 / seconds * (folder / name).stat().st_size for name in ("run.mcap", "run.rrd")]
+    return Endurance(rate, result.dropped, watch.resident_mb, *sizes)
+
+
+class _Memory(threading.Thread):
+    """Looks at the telemetry process from outside."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(daemon=True)
+        self._session = session
+        self.ended = threading.Event()
+        self.resident_mb: list[float] = []
+
+    def run(self) -> None:
+        """Look once a second."""
+        while not self.ended.wait(1.0):
+            pid = self._session.telemetry_pid
+            status = Path(f"/proc/{pid}/status")
+            if pid is not None and status.exists():
+                lines = status.read_text("utf-8").splitlines()
+                self.resident_mb += [
+                    1e-3 * int(line.split()[1]) for line in lines if line.startswith("VmRSS")
+                ]
