@@ -64,6 +64,12 @@ def _slide(page: Chrome, key: str, to: float) -> None:
     )
 
 
+def _type(page: Chrome, key: str, text: str) -> None:
+    """Type over a number: all of it selected, for whatever has no focus is written by the page again."""
+    control, a, tab = "\ue009", "a", "\ue004"
+    _by(page, f"number-{key}").send_keys(control + a, "\ue000" + text + tab)
+
+
 def _complaints(page: Chrome) -> list[dict[str, Any]]:
     log: list[dict[str, Any]] = page.get_log("browser")  # type: ignore[no-untyped-call]
     return [entry for entry in log if "favicon" not in entry["message"]]
@@ -85,9 +91,7 @@ def test_page_changes_a_run_shows_what_was_applied_and_stops_it(tmp_path: Path) 
         until(lambda: _text(page, "applied-controller.kp_1_s2") != "4000", "the gain was read back")
         applied = _text(page, "applied-controller.kp_1_s2")
         until(lambda: "applied at" in _text(page, "log"), "the page said when")
-        number = _by(page, "number-reference.amplitude_rad")
-        number.clear()
-        number.send_keys("0.6\t")
+        _type(page, "reference.amplitude_rad", "0.6")
         until(lambda: _text(page, "applied-reference.amplitude_rad") == "0.6", "the amplitude was read back")
         until(lambda: float(_text(page, "time").split()[0]) > 4.0, "a few seconds to look at")
         _keep_picture(page, "panel.png")
@@ -134,9 +138,7 @@ def test_page_says_why_a_change_was_refused(tmp_path: Path) -> None:
         page.get(address_of(panel))
         until_running(run)
         until(lambda: _text(page, "phase") == "running", "the page showed the phase")
-        number = _by(page, "number-observer.mu0_rad_s")
-        number.clear()
-        number.send_keys("5000\t")
+        _type(page, "observer.mu0_rad_s", "5000")
         until(lambda: "too fast for loop.rate_hz" in _text(page, "log"), "the page said why")
         assert _text(page, "applied-observer.mu0_rad_s") == "40"
 
