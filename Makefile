@@ -49,7 +49,7 @@ faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real h
 	@mkdir -p reports
 	@failed=0; \
 	$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 \
-		--markdown reports/faults.md --json reports/faults.json || failed=1; \
+		--markdown reports/faults.md --json reports/faults.json $(ARGS) || failed=1; \
 	$(BIN)/python -m tools.host_death --n 30 \
 		--markdown reports/host-death.md --json reports/host-death.json || failed=1; \
 	$(BIN)/python -m tools.host_endings --n 10 \

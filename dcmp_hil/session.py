@@ -215,6 +215,9 @@ class Session:
 
     def _run_line(self) -> None:
         line, recorder = self._line, self._recorder
+        device = getattr(line.backend, "described", "")
+        if device:
+            recorder.event(Event(0.0, "INFO", f"device: {device}"))
         t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
         if self.rig.run.end == "lower" and not self.stop.requested:
             recorder.event(Event(t, "INFO", "lowering the arm"))

@@ -10,7 +10,6 @@ import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +29,7 @@ _HEAD = (
 )
 _ENOUGH = 95.0  # %
 _SHOWN, _AGAIN = 3, 25
+_FIRST_VARIANTS = 2
 
 
 @dataclass
@@ -121,10 +121,24 @@ def tell(lines: Sequence[Line], seconds: float, write: Callable[[str], object]) 
     return int(broken > 0 or false_trips or not 100.0 * right / runs >= _ENOUGH)
 
 
+def variants(places: Sequence[int]) -> list[int]:
+    """Return for each row how many rows of its kind come before it."""
+    seen: Counter[str] = Counter()
+    found = []
+    for place in places:
+        kind = ROWS[place].fault.partition(":")[0].partition(" ")[0]
+        found.append(seen[kind])
+        seen[kind] += 1
+    return found
+
+
 def main() -> int:
     """Run, tell, and leave with 1 if something is wrong."""
     parser = argparse.ArgumentParser(prog="python -m tools.faults", description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="runs of each row (default: 5)")
+    parser.add_argument(
+        "--further", type=int, help="runs of each third and later variant of a kind (as many)"
+    )
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: 0)")
     parser.add_argument("--healthy", type=int, default=50, help="runs without a fault (default: 50)")
     parser.add_argument("--only", default="", metavar="TEXT", help="rows whose text has this in it")
@@ -137,8 +151,9 @@ def main() -> int:
     places = [place for place, row in enumerate(ROWS) if asked.only in row.fault]
     blocks = min(asked.healthy, 20)
     with ProcessPoolExecutor(asked.processes) as pool:
-        seeds = range(asked.first, asked.first + asked.seeds)
-        lines = pool.map(partial(run_row, seeds=seeds), places)
+        further = asked.seeds if asked.further is None else min(asked.further, asked.seeds)
+        runs = [asked.seeds if variant < _FIRST_VARIANTS else further for variant in variants(places)]
+        lines = pool.map(run_row, places, [range(asked.first, asked.first + n) for n in runs])
         healthy_seeds = [range(block, asked.healthy, blocks) for block in range(blocks)]
         table = [*lines, *([merged([*pool.map(run_healthy, healthy_seeds)])] if blocks else [])]
     said: list[str] = []

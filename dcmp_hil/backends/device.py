@@ -15,6 +15,7 @@ from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Drive, FaultReport, Health, SampleReport, State, Stop, StopReason
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -132,6 +133,11 @@ class DeviceBackend:
                 error.add_note(str(unconfirmed))
         finally:
             self._link.close()
+
+    @property
+    def described(self) -> str:
+        """What the device says it is, once it is open."""
+        return f"{self._link.name}, node {self._node}, firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
 
     def read(self) -> Sample:
         """Wait for the next SAMPLE and return the newest.

@@ -34,14 +34,27 @@ def needed() -> None:
     pytest.skip(sentence)
 
 
+_DRAWS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+"""Instead of --disable-gpu: the web viewer draws through WebGL, here without a graphics card."""
+
+
 @contextmanager
-def browser(folder: Path) -> Iterator[Chrome]:
-    """Start a browser whose settings, cache and history are in `folder`."""
+def browser(folder: Path, *, draws: bool = False) -> Iterator[Chrome]:
+    """Start a browser whose settings, cache and history are in `folder`.
+
+    Parameters
+    ----------
+    folder
+        Empty at first.
+    draws
+        Whether pages need WebGL.
+    """
     from selenium.webdriver import Chrome, ChromeOptions, ChromeService
 
     options = ChromeOptions()
     options.binary_location = shutil.which("chromium") or ""
-    for argument in (*_QUIET, f"--user-data-dir={folder}"):
+    quiet = [*(word for word in _QUIET if word != "--disable-gpu"), *_DRAWS] if draws else _QUIET
+    for argument in (*quiet, f"--user-data-dir={folder}"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = Chrome(options, ChromeService(shutil.which("chromedriver")))

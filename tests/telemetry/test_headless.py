@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 _MISSING = not any(folder.is_dir() and any(folder.iterdir()) for folder in _DRIVERS)
+_REPORTS = Path("reports")
 _LOOPBACK = {"0100007F", "00000000000000000000000001000000", "0000000000000000FFFF00000100007F"}
 _VIEWS = {
     *("Position [rad]", "Velocity [rad/s]", "Disturbance [rad/s²]", "Tracking error [mrad]", "Voltage [V]"),
@@ -33,6 +35,7 @@ _VIEWS = {
         "Events",
         "Parameters",
         "Pendulum (true)",
+        "Phase portrait",
     ),
 }
 
@@ -96,12 +99,19 @@ def listening(process: int | str) -> set[str]:
 def test_a_recording_opens_right_without_a_click(tmp_path: Path) -> None:
     feed(RerunSink(VIEW, tmp_path / "run.rrd", "none"), periods=3000)
     seen = screenshot(tmp_path / "run.rrd", tmp_path / "run.png", at=2.0)
+    _keep(tmp_path / "run.png")
     assert {view.name for view in seen.state.views if view.visible} >= _VIEWS
     assert seen.complaints == []
     (recording,) = [r for r in seen.state.recordings if r.store_id == seen.state.active_recording]
     assert (recording.current_timeline, recording.current_time) == ("loop_time", 2_000_000_000)
     for colour in (ESTIMATE, VOLTAGE, ERROR):
         assert coloured(tmp_path / "run.png", colour) > 100
+
+
+def _keep(picture: Path) -> None:
+    """Keep what was seen, for whoever looks at what CI made."""
+    _REPORTS.mkdir(exist_ok=True)
+    shutil.copyfile(picture, _REPORTS / f"dashboard-{picture.name}")
 
 
 def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunSink, tmp_path: Path) -> None:
@@ -119,6 +129,7 @@ def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunS
         served.close()  # waits until the viewer has it all
         reached = _reached(viewer, 2_999_000_000)
         seen = look(viewer, tmp_path / "live.png")
+    _keep(tmp_path / "live.png")
     assert reached == 2_999_000_000
     assert seen.complaints == []
     assert addresses

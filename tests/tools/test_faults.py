@@ -8,7 +8,7 @@ import pytest
 
 from tests.faults.matrix import Verdict
 from tests.faults.rows import ROWS
-from tools.faults import Line, merged, run_healthy, run_row, tell
+from tools.faults import Line, merged, run_healthy, run_row, tell, variants
 
 GOOD = Verdict("stuck", True, 80.0, ())
 WRONG = Verdict("power", False, 120.0, ())
@@ -64,3 +64,11 @@ def test_rows_and_healthy_blocks_are_run() -> None:
     assert run_row(place, [1]).outcomes == {"STOPPED": 1}
     healthy = merged([run_healthy(range(1)), run_healthy(range(1, 2))])
     assert (healthy.runs, healthy.right) == (2, 2)
+
+
+def test_ci_has_a_hundred_seeds_for_forty_rows_and_more() -> None:
+    found = variants(range(len(ROWS)))
+    assert sum(variant < 2 for variant in found) >= 60
+    assert max(found) > 2
+    assert found[0] == 0
+    assert variants([3, 3, 3]) == [0, 1, 2]
