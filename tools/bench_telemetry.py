@@ -39,13 +39,6 @@ class Endurance:
     mcap_mb_a_minute: float
     rrd_mb_a_minute: float
 
-    @property
-    def growth_mb(self) -> float:
-        """How much larger the last quarter was than the second."""
-        quarter = max(1, len(self.resident_mb) // 4)
-        second, last = self.resident_mb[quarter : 2 * quarter], self.resident_mb[-quarter:]
-        return statistics.median(last) - statistics.median(second or last)
-
 
 def everything(rig: Rig, folder: Path) -> list[SinkMaker]:
     """Return who looks on at most: the run's own recording, the dashboard in a file and served."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorder", "Sink"]
 
-_IN_LINE = 4096  # rows a block in virtual time, where nobody waits
+_IN_LINE = 4096  # rows a block in virtual time, where nobody waits, at most
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
 _LAST_BLOCK = 2.0  # s that the end of a run waits for the thread
 
@@ -69,8 +69,8 @@ class Recorder:
         self._truth = truth
         self._now = aligner.now
         self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model)
-        self._look_at_link = LinkWatch(backend, recent, self.event).look
-        self._untold = 0
+        self._look_at_link = LinkWatch(backend, 1, self.event).look
+        self._every = self._left = min(recent, _IN_LINE)  # periods until what is done now and then
         self._in_line = in_line
         self._service = Service(self._audience) if sinks and not in_line else None
         self._closed = False
@@ -80,11 +80,11 @@ class Recorder:
         now, began = self._now(cycle.sample.t, cycle.reference)
         self._push(cycle, self._truth(), now, began)
         self.recent.append(cycle)
-        self._look_at_link(cycle.sample.t)
-        if self._in_line:
-            self._untold += 1
-            if self._untold == _IN_LINE:
-                self._untold = 0
+        self._left -= 1
+        if not self._left:
+            self._left = self._every
+            self._look_at_link(cycle.sample.t)
+            if self._in_line:
                 self._audience.hand_on()
 
     def event(self, event: Event) -> None:

@@ -31,9 +31,8 @@ FIELDS = (
 
 NOWHERE = Reference(math.nan, math.nan, math.nan)
 _NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
-_COUNT = struct.Struct("q")  # in native form, which is one store of the CPU
 _HEAD, _SIZE = 64, _NUMBERED.size
-_pack, _count = _NUMBERED.pack_into, _COUNT.pack_into
+_pack = _NUMBERED.pack_into
 
 
 def size_of(capacity: int) -> int:
@@ -66,6 +65,8 @@ class Ring:
         self.position = 0  # the next row to read
         self._rows = np.frombuffer(self.memory, np.float64, offset=_HEAD).reshape(capacity, -1)
         self._written = 0
+        # One store of the CPU; `pack_into` would clear the place first, and a reader might find 0 there.
+        self._count = memoryview(self.memory)[:8].cast("q")
 
     def push(self, cycle: Cycle, truth: Truth, now: Reference = NOWHERE, began: float = -math.inf) -> None:
         """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
@@ -76,13 +77,12 @@ class Ring:
             self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth, *now, began
         )  # fmt: skip
         self._written = k + 1
-        _count(self.memory, 0, k + 1)
+        self._count[0] = k + 1
 
     @property
     def written(self) -> int:
         """Rows written so far."""
-        count: int = _COUNT.unpack_from(self.memory)[0]
-        return count
+        return self._count[0]
 
     @property
     def newest(self) -> float:

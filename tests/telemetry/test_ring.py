@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import mmap
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
-from dcmp_hil.telemetry.ring import FIELDS, Ring
+from dcmp_hil.telemetry.ring import FIELDS, Ring, size_of
 from dcmp_hil.values import Truth
 from tests.helpers import cycle
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 TRUTH = Truth(7.0, 8.0, 9.0)
 
@@ -73,3 +81,32 @@ def test_rows_overwritten_while_they_are_copied_are_left_out_and_counted(
         rows = ring.drain()
     assert rows[:, 0].tolist() == [0, 1, 2, 3][overtaken:]
     assert ring.dropped == min(overtaken, 4)
+
+
+_READS = """
+import mmap, sys
+from dcmp_hil.telemetry.ring import Ring
+with open(sys.argv[1], "r+b") as file:
+    ring = Ring(64, mmap.mmap(file.fileno(), 0))
+print("up", flush=True)
+last, back = 0, 0
+while last < 300_000:
+    now = ring.written
+    back += now < last
+    last = max(last, now)
+print(back)
+"""
+
+
+def test_another_process_never_sees_the_count_go_back(tmp_path: Path) -> None:
+    """It did: what packs a number clears its place first."""
+    (tmp_path / "ring").write_bytes(bytes(size_of(64)))
+    with (tmp_path / "ring").open("r+b") as file:
+        ring = Ring(64, mmap.mmap(file.fileno(), 0))
+    command = [sys.executable, "-c", _READS, str(tmp_path / "ring")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as reader:
+        assert reader.stdout is not None
+        assert reader.stdout.readline() == "up\n"
+        for k in range(300_000):
+            ring.push(cycle(1e-3 * k), TRUTH)
+        assert reader.communicate(timeout=60.0)[0] == "0\n"
