@@ -162,7 +162,7 @@ while True:
 
 
 def _killed(folder: Path, rate: int) -> float:
-    """Write rows for half a second, kill whoever records them, and return what was lost, s."""
+    """Write rows for half a second, kill whoever records them; return the age of the oldest one lost, s."""
     import mmap
 
     capacity = 1 << 15
@@ -175,16 +175,19 @@ def _killed(folder: Path, rate: int) -> float:
         while not (folder / "up").exists():
             assert time.monotonic() < end
             time.sleep(0.01)
-        began, pushed = time.monotonic(), 0
-        while pushed < 0.5 * rate:
-            due = int((time.monotonic() - began) * rate)
-            for k in range(pushed, due):
+        pushed: list[float] = []  # s, when each row came
+        began = time.monotonic()
+        while len(pushed) < 0.5 * rate:
+            now = time.monotonic()
+            for k in range(len(pushed), int((now - began) * rate)):
                 row = cycle(k)
                 ring.push(row._replace(sample=row.sample._replace(t=k / rate)), truth(k))
-            pushed = max(pushed, due)
+                pushed.append(now)
             time.sleep(1e-3)
         process.send_signal(signal.SIGKILL)
-    return pushed / rate - len(read_run(folder).rows) / rate
+        killed = time.monotonic()
+    lost = pushed[len(read_run(folder).rows) :]
+    return killed - lost[0] if lost else 0.0
 
 
 @pytest.mark.parametrize("rate", [1000, 10_000])
