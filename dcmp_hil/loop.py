@@ -96,29 +96,30 @@ def run(line: Line, until: float, stop: Stop) -> float:
         sample = backend.read()
         while outliers.reject(sample):  # as if it had been lost: the device holds its voltage
             sample = backend.read()
+        t = sample.t
         arrived = clock.now_ns() * 1e-9
         estimate = observer.update(sample)
         if first != first:
-            first = arrived - sample.t
+            first = arrived - t
             trajectory.hold(estimate.position)
         if supervisor.engages(sample):
-            trajectory.begin(sample.t, estimate.position)
+            trajectory.begin(t, estimate.position)
         ahead = predictor.ahead(sample, estimate)
-        reference = supervisor.bound(sample, trajectory.at(sample.t + delay))
+        reference = supervisor.bound(sample, trajectory.at(t + delay))
         demand = controller.update(reference, ahead)
         voltage = supervisor.admit(sample, estimate, demand)
         backend.write(voltage)
         predictor.sent(voltage)
         left = clock.now_ns() * 1e-9
-        timing = _new(Timing, (arrived - previous, arrived - first - sample.t, left - arrived))
+        timing = _new(Timing, (arrived - previous, arrived - first - t, left - arrived))
         telemetry.record(_new(Cycle, (sample, estimate, reference, demand, voltage, timing)))
         previous = arrived
-        changes.apply(sample.t)
+        changes.apply(t)
 
         if supervisor.trip is not None:
             raise supervisor.trip
         late = overruns.look(timing)
         if late is not None:
-            supervisor.stop_orderly(late, sample.t)
-        elif (sample.t >= until or stop.requested) and not supervisor.stopping:
-            return sample.t
+            supervisor.stop_orderly(late, t)
+        elif (t >= until or stop.requested) and not supervisor.stopping:
+            return t

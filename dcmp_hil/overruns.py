@@ -39,6 +39,7 @@ class Overruns:
     def __init__(self, period: float, limit: int | None = None) -> None:
         self.count = 0
         self._period, self._limit = period, limit
+        self._leak, self._late = _LEAK * period, _LATE * period
         self._punctual = 0.0  # s, lateness of the most punctual sample
         self._recent = 0  # a bit a period, the newest last
         self._cold = round(_WARM / period)  # periods to go
@@ -46,10 +47,12 @@ class Overruns:
     def look(self, timing: Timing) -> DeadlineError | None:
         """Take the timing of one period; return why the run should end if too many were late."""
         _, lateness, compute = timing
-        period = self._period
-        punctual = self._punctual + _LEAK * period
-        self._punctual = punctual = min(lateness, punctual)
-        late = lateness - punctual > _LATE * period or compute > period
+        punctual = self._punctual + self._leak
+        behind = lateness - punctual
+        if behind < 0.0:
+            punctual, behind = lateness, 0.0
+        self._punctual = punctual
+        late = behind > self._late or compute > self._period
         if self._cold:
             self._cold -= 1
             self.count += late

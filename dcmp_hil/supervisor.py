@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.limits import Limits
     from dcmp_hil.monitors import Monitor
     from dcmp_hil.probe import Probe
-    from dcmp_hil.values import Estimate, Reference, Sample
+    from dcmp_hil.values import Estimate, Sample
 
 
 class Phase(StrEnum):
@@ -82,6 +82,8 @@ class Supervisor:
     ----------
     limits
         As given.
+    bound
+        What of a reference they allow.
     phase
         Where the run stands.
     stopping
@@ -102,6 +104,7 @@ class Supervisor:
     ) -> None:
         self._checks = tuple(monitor.check for monitor in monitors)
         self.limits = limits
+        self.bound = limits.reference
         self._settle, self._engage = settle, engage
         self._notify = notify
         self._probe = probe
@@ -127,10 +130,6 @@ class Supervisor:
             self._cue(Cue.SETTLED, sample.t)
             return True
         return False
-
-    def bound(self, sample: Sample, reference: Reference) -> Reference:
-        """Return what of the reference the limits allow."""
-        return self.limits.reference(sample, reference)
 
     def admit(self, sample: Sample, estimate: Estimate, demand: float) -> float:
         """Return the voltage to send, V.

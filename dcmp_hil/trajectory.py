@@ -33,6 +33,7 @@ class Trajectory:
         self._t0 = 0.0
         self._x0 = 0.0
         self._begun = False
+        self._plain_from = math.inf  # s, device time from which the reference is all there is
         self._way_down: _Quintic | None = None
         self._bridge: _Quintic | None = None  # what is left of the reference before the last change
 
@@ -53,10 +54,13 @@ class Trajectory:
     def begin(self, t: float, position: float) -> None:
         """Start the trajectory's clock at device time `t`, from `position` (rad)."""
         self._t0, self._x0, self._begun = t, position, True
+        if self._way_down is None:
+            self._plain_from = t + self._soft_start
 
     def lower(self, t: float) -> None:
         """From `t` on, go down to position 0, hanging, in `LOWERING` seconds; nothing jumps."""
         self._way_down = _Quintic(t, LOWERING, self.at(t))
+        self._plain_from = math.inf
 
     def change(self, t: float, source: ReferenceSource) -> None:
         """Go over into another reference from device time `t` on (s), with no jump up to the acceleration.
@@ -67,11 +71,15 @@ class Trajectory:
         before = self.at(t)
         self._source, self._bridge = source, None
         if self._begun:
+            plain_from, self._plain_from = self._plain_from, math.inf
             gap = Reference(*(old - new for old, new in zip(before, self.at(t), strict=True)))
             self._bridge = _Quintic(t, _time_to_bridge(gap), gap)
+            self._plain_from = max(plain_from, t + self._bridge.length)
 
     def at(self, t: float) -> Reference:
         """Return the reference at device time `t`."""
+        if self._plain_from <= t < math.inf:
+            return self._source.at(t - self._t0)
         if self._way_down is not None and t >= self._way_down.t0:
             return self._way_down.at(t)
         bridge = self._bridge

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _new = tuple.__new__  # a third of the time of a NamedTuple's own
 _SEQ = 0x1FFF
 _RUN = int(State.RUN)
+_HEALTHY = Fault.NONE  # found here faster than in its class
 _MOST_mV = 32_767.0  # what 16 bits hold
 _OTHER_FAULT = 7  # fault_class that only says: see FAULT
 _MOST_LOST = 127  # periods that a tick of 8 bits can bridge
@@ -152,15 +153,16 @@ class DeviceBackend:
         if not self._open:
             raise LinkError("The device is not open. Use it as a context manager: with backend: ...")
         report = self._next_report()
-        if report.state == _RUN and self._tick - self._answered > self._memory:
+        _, voltage_mV, _, state, _, _, _ = report
+        if state == _RUN and self._tick - self._answered > self._memory:
             raise LinkError(
                 f"{self._link.name}: the device runs, and not on this host's commands: it was not heard of "
                 "for too long, and another host has it now. End one of the two."
             )
         terms = self._terms
         position = (self._count - self._zero) * terms.rad_per_count
-        fault = Fault.NONE if report.state == _RUN else self._fault_in(report)
-        return _new(Sample, (self._t, position, report.voltage_mV / terms.mV_per_V, fault))
+        fault = _HEALTHY if state == _RUN else self._fault_in(report)
+        return _new(Sample, (self._t, position, voltage_mV / terms.mV_per_V, fault))
 
     def write(self, voltage: float) -> None:
         """Send a voltage, V; a number that is not finite is sent as 0 V."""
@@ -198,7 +200,7 @@ class DeviceBackend:
             if frame is not None:
                 newest = self._take(frame)
             heard_ns = now_ns()
-        if newest.state == _RUN and link.pending:  # the end of a run is not skipped
+        if link.pending and newest.state == _RUN:  # the end of a run is not skipped
             newest = self._newest_after(newest)
         self._heard_ns = heard_ns
         return newest
@@ -232,9 +234,10 @@ class DeviceBackend:
     def _taken(self, report: SampleReport) -> SampleReport | None:
         """Advance device time and position; lost samples show as a larger step, late ones as nothing."""
         last = self._tick
-        tick = nearest(last, report.tick, 8)
+        counts, _, raw_tick, state, _, _, _ = report
+        tick = nearest(last, raw_tick, 8)
         if tick <= last:
-            if report.state == _RUN:
+            if state == _RUN:
                 self.counters.stale += 1
                 return None
             tick = last + 1  # a device that was reset counts anew
@@ -242,9 +245,9 @@ class DeviceBackend:
         self._tick = tick
         self._t = (tick - self._first_tick) * self._period
         if self._has_count:
-            self._count = nearest(self._count, report.position_counts, 24)
+            self._count = nearest(self._count, counts, 24)
         else:
-            self._start_counting(report.position_counts)
+            self._start_counting(counts)
         return report
 
     def _start_counting(self, raw: int) -> None:

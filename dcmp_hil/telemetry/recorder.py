@@ -77,13 +77,15 @@ class Recorder:
 
     def record(self, cycle: Cycle) -> None:
         """Take one period."""
-        now, began = self._now(cycle.sample.t, cycle.reference)
+        sample, _, reference, _, _, _ = cycle
+        t = sample.t
+        now, began = self._now(t, reference)
         self._push(cycle, self._truth(), now, began)
         self.recent.append(cycle)
         self._left -= 1
         if not self._left:
             self._left = self._every
-            self._look_at_link(cycle.sample.t)
+            self._look_at_link(t)
             if self._in_line:
                 self._audience.hand_on()
 

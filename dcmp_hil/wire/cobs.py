@@ -10,21 +10,28 @@ from dcmp_hil.wire.frame import Frame
 _new = tuple.__new__  # a third of the time of a NamedTuple's own
 _LEAST, _MOST = 6, 13  # bytes of an encoded frame, without its delimiter
 _HIGHEST = 0x7FF
-_IDS = [number.to_bytes(2, "little") for number in range(_HIGHEST + 1)]
-_ID_CRC = [crc_hqx(number, 0xFFFF) for number in _IDS]
+_ID_CRC = [crc_hqx(number.to_bytes(2, "little"), 0xFFFF) for number in range(_HIGHEST + 1)]
 """CRC-16/IBM-3740 of every identifier: where that of its payload goes on."""
 _two_bytes = Struct("<H").pack
 _DISTANCE = [bytes((length + 1,)) for length in range(_MOST)]
 _take_apart = [Struct(f"<xH{max(0, length - 5)}sH").unpack for length in range(_MOST + 1)]
 
 
+def _beginning(number: int) -> tuple[bytes, bytes]:
+    """Return an identifier with its zeros replaced, up to the last, and what follows that."""
+    *ended, open_ = number.to_bytes(2, "little").split(b"\0")
+    return b"".join(_DISTANCE[len(part)] + part for part in ended), open_
+
+
+_BEGINNING = [_beginning(number) for number in range(_HIGHEST + 1)]
+
+
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame, its delimiter included."""
     number, data = frame
-    body = _IDS[number] + data + _two_bytes(crc_hqx(data, _ID_CRC[number]))
-    stuffed = b""
-    for part in body.split(b"\0"):  # every zero becomes the distance to the next
-        stuffed += _DISTANCE[len(part)] + part
+    stuffed, begun = _BEGINNING[number]
+    for part in (begun + data + _two_bytes(crc_hqx(data, _ID_CRC[number]))).split(b"\0"):
+        stuffed += _DISTANCE[len(part)] + part  # every zero becomes the distance to the next
     return stuffed + b"\0"
 
 
@@ -66,9 +73,8 @@ def _decode(chunk: bytes) -> Frame | None:
     length = len(chunk)
     if not _LEAST <= length <= _MOST:
         return None
-    body = bytearray(chunk)
-    place = 0
-    while place < length:  # every distance becomes the zero that it stands for
+    body, place = bytearray(chunk), chunk[0]
+    while place < length:  # every distance becomes the zero that it stands for; nobody reads the first
         distance = body[place]
         body[place] = 0
         place += distance
