@@ -6,6 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.controllers import Gains
+from dcmp_hil.live.change import applied
 from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING, Answer
 from dcmp_hil.supervisor import Phase
 from dcmp_hil.values import Event
@@ -122,7 +123,7 @@ class LiveChanges:
             return
         self._mailbox.reply(number, Answer(what, t))
         if what == APPLIED:
-            sentence = f"{change.words}, applied at t = {t:.3f} s"
+            sentence = applied(change.words, t)
             self._notify(Event(t, "INFO", sentence))
             if len(self.made) < _KEPT:
                 self.made.append(sentence)

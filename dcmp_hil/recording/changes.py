@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
+from dcmp_hil.live.change import found_in
 from dcmp_hil.live.settable import changed
 
 if TYPE_CHECKING:
@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.live.change import Change
     from dcmp_hil.values import Event
-
-_APPLIED = re.compile(r"(.*), applied at t = [0-9.]+ s")
-_ONE = re.compile(r"([a-z_]+\.\w+)(?:: .*? -> | = )(.*?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
 
 
 def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
@@ -35,8 +32,7 @@ def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
     """
     found = []
     for event in events:
-        applied = _APPLIED.fullmatch(event.text)
-        overrides = [f"{key}={value}" for key, value in _ONE.findall(applied[1])] if applied else []
+        overrides = [f"{key}={value}" for key, value in found_in(event.text).items()]
         if overrides:
             rig, change = changed(rig, overrides)
             found.append((event.t, change))

@@ -8,6 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from dcmp_hil.telemetry import portrait
+from dcmp_hil.telemetry.parameters import PATH, RELATIVE
 from dcmp_hil.telemetry.scenery import LINK
 from dcmp_hil.telemetry.titles import title
 
@@ -127,7 +128,8 @@ def _link() -> rrb.TimeSeriesView:
 
 def _parameters() -> rrb.Tabs:
     return rrb.Tabs(
-        rrb.TextDocumentView(origin="params", name="Parameters"),
+        rrb.TextDocumentView(origin=PATH, contents=["$origin"], name="Parameters"),
+        plot(RELATIVE, window=None, name="Changes [of the value at the start]"),
         rrb.TextDocumentView(origin="about", name="Versions and host"),
         active_tab=0,
     )

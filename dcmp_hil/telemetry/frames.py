@@ -11,6 +11,7 @@ from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.histogram import Histogram
 from dcmp_hil.telemetry.lanes import Lane
 from dcmp_hil.telemetry.link import counters
+from dcmp_hil.telemetry.parameters import PATH, RELATIVE, Parameters, line_of, table_of
 from dcmp_hil.telemetry.portrait import Portrait
 from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
 from dcmp_hil.telemetry.signals import by_plot
@@ -55,6 +56,7 @@ class Frames:
         self._lanes = {name: Lane() for name in ("voltage", "samples")}
         self._last_slot = -1
         self._portrait = Portrait()
+        self._parameters = Parameters(rig.parameters, rig.kinds)
         self._bucket = rows_per_bucket(rig.period)
 
     def choose_lines(self, block: Block) -> None:
@@ -70,21 +72,42 @@ class Frames:
 
     def of_block(self, block: Block) -> list[Call]:
         """Return the calls for consecutive periods, at least one."""
-        calls = [*self._lines(block), *self._slow(block), *self._states(block)]
+        calls = [*self._lines(block), *self._slow(block), *self._states(block), *self._tuned(block["t"][-1:])]
         for field, histogram in self._histograms.items():
             if histogram.add(block["t"], block[field]):
                 calls.append(self._bars(field, block["t"][-1:]))
         return calls + self._phase(block)
 
-    def of_event(self, event: Event) -> Call:
-        """Return the call for an event."""
+    def of_event(self, event: Event) -> list[Call]:
+        """Return the calls for an event."""
         t = np.array([event.t])
         if event.level == "PHASE":
-            return self._state("phase", t, [event.text])
+            return [self._state("phase", t, [event.text])]
         if event.level == "LINK":
             counts = np.array([list(counters(event.text).values())])
-            return LINK, self._times(t), rr.Scalars.columns(scalars=counts)
-        return "events/log", self._times(t), rr.TextLog.columns(text=[event.text], level=[event.level])
+            return [(LINK, self._times(t), rr.Scalars.columns(scalars=counts))]
+        told = rr.TextLog.columns(text=[event.text], level=[event.level])
+        return [("events/log", self._times(t), told), *self._changed(event)]
+
+    def of_start(self) -> list[Call]:
+        """Return the calls for what the run is tuned by as it begins."""
+        return self._table(0.0, dict(self._parameters.numbers()))
+
+    def _changed(self, event: Event) -> list[Call]:
+        changed = self._parameters.take(event)
+        return [] if changed is None else self._table(event.t, changed)
+
+    def _table(self, t: float, numbers: dict[str, float]) -> list[Call]:
+        times = self._times(np.array([t]))
+        text = table_of(self._rig.name, self._parameters.rows.items())
+        page = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
+        lines = [(line_of(key), times, rr.Scalars.columns(scalars=[value])) for key, value in numbers.items()]
+        return [(PATH, times, page), *lines]
+
+    def _tuned(self, t: NDArray[np.float64]) -> Iterator[Call]:
+        """Yield all of it over what it was at the start; a line without an end until there is a new one."""
+        if self._parameters.drawn:
+            yield RELATIVE, self._times(t), rr.Scalars.columns(scalars=[self._parameters.relative])
 
     def _lines(self, block: Block) -> Iterator[Call]:
         for plot, signals in self.plots.items():

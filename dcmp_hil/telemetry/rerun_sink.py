@@ -152,7 +152,7 @@ class RerunSink:
         self._log(Event(t, "WARN", sentence))
 
     def _log(self, event: Event) -> None:
-        self._tell(partial(_send, [self._frames.of_event(event)]), event.t)
+        self._tell(partial(_send, self._frames.of_event(event)), event.t)
 
     def _stream(self) -> rr.RecordingStream:
         return rr.RecordingStream(self._application, recording_id=self._recording)
@@ -234,6 +234,7 @@ def _begin(
     stream.send_recording_name(rig.name)
     stream.send_blueprint(layout)
     log_scenery(stream, rig)
+    _send(Frames(rig).of_start(), stream)
 
 
 def _log_styles(plots: dict[str, list[Signal]], stream: rr.RecordingStream) -> None:
@@ -246,7 +247,7 @@ def _warm_up(rig: RigView) -> None:
     frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
     frames.choose_lines(block)
     stream = rr.RecordingStream("warm-up")
-    _send([*frames.of_block(block), frames.of_event(Event(0.0, "INFO", ""))], stream)
+    _send([*frames.of_start(), *frames.of_block(block), *frames.of_event(Event(0.0, "INFO", ""))], stream)
     stream.disconnect()
 
 

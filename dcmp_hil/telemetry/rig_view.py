@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.explain import explain, simulated
+from dcmp_hil.config.rig import KINDS
 from dcmp_hil.host import host_facts
 from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from dcmp_hil.config import Rig
     from dcmp_hil.model import Model
 
@@ -39,6 +42,8 @@ class RigView:
         Whether there is a wire, with counters.
     about
         Rows of the table of versions and of the computer.
+    kinds
+        "reference.kind=sine" to the keys of that kind, for what may change in a run.
     """
 
     name: str
@@ -49,6 +54,7 @@ class RigView:
     model: Model = UNKNOWN_MODEL
     wired: bool = False
     about: tuple[tuple[str, str], ...] = ()
+    kinds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 _FIRST = ("controller", "observer", "reference", "loop")  # what is tuned stands where nobody need scroll
@@ -67,7 +73,17 @@ def view_of(rig: Rig) -> RigView:
         model=rig.model.values(),
         wired=rig.backend.kind != "sim",
         about=_about(),
+        kinds=_kinds(),
     )
+
+
+def _kinds() -> dict[str, tuple[str, ...]]:
+    """Return the keys of every kind of controller, observer and reference."""
+    return {
+        f"{section}.kind={kind}": tuple(f"{section}.{key}" for key in settings.model_fields)
+        for section in ("controller", "observer", "reference")
+        for kind, settings in KINDS[section].items()
+    }
 
 
 def _about() -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""What a recording shows that does not change: styles of lines, the drawn pendulum, the parameters."""
+"""What a recording shows that does not change: styles of lines, the drawn pendulum, versions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from dcmp_hil.telemetry.link import DEVICE, HOST
+from dcmp_hil.telemetry.parameters import RELATIVE, Parameters, table_of
 from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
 
 if TYPE_CHECKING:
@@ -51,7 +52,8 @@ def lane_path(lane: str) -> str:
 
 def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
     """Log all that is known before the first period."""
-    _log_parameters(stream, rig)
+    _log_about(stream, rig)
+    _style_parameters(stream, rig)
     _log_stand(stream)
     _log_arm(stream)
     if rig.voltage_limit is not None:
@@ -98,14 +100,15 @@ def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
 
 
-def _log_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
-    for entity, head, rows in (
-        ("params", rig.name, rig.parameters),
-        ("about", "versions and host", rig.about),
-    ):
-        lines = [f"| {name} | {value} |" for name, value in rows]
-        text = "\n".join([f"| {head} | |", "|:--|:--|", *lines])
-        stream.log(entity, rr.TextDocument(text, media_type="text/markdown"), static=True)
+def _log_about(stream: rr.RecordingStream, rig: RigView) -> None:
+    text = table_of("versions and host", rig.about)
+    stream.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
+
+
+def _style_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
+    names = Parameters(rig.parameters, rig.kinds).drawn
+    style = rr.SeriesLines(names=list(names), widths=[1.6] * len(names), interpolation_mode="StepAfter")
+    stream.log(RELATIVE, style, static=True)
 
 
 def _circle(radius: float, z: float) -> NDArray[np.float64]:
