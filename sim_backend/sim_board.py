@@ -9,7 +9,6 @@ from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.config.backends import SimBoard
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import cobs, slcan
-from dcmp_hil.wire.frame import Frame
 from sim_backend.board import Board
 from sim_backend.pace import Pace
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Sample, Truth
+    from dcmp_hil.wire.frame import Frame
     from sim_backend.fault_kinds.injection import Injection
 
 _CARRIERS = {"cobs": cobs, "slcan": slcan}
@@ -140,6 +140,6 @@ class BoardLink:
 
     def _fetch(self) -> None:
         if self._receiver is None:
-            self._frames.extend(Frame(*frame) for frame in self._board.transmit_frames())
+            self._frames.extend(self._board.transmit_frames())
         elif data := self._board.transmit():
             self._frames.extend(self._receiver.feed(data))

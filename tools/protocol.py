@@ -140,10 +140,10 @@ def _examples(value: int) -> str:
         FaultReport(1, 252, 20_750),
         Stop(3),
     ):
-        frame = pack(message)
+        frame = number, data = pack(message)
         fields = ", ".join(f"{name} {int(one)}" for name, one in message._asdict().items())
         lines.append(
-            f"| {type(message).__name__} ({fields}) | {frame.id:03X} {frame.data.hex(' ').upper()} "
+            f"| {type(message).__name__} ({fields}) | {number:03X} {data.hex(' ').upper()} "
             f"| {cobs.encode(frame).hex(' ').upper()} | `{slcan.encode(frame).decode().strip()}` |"
         )
     return "\n".join(lines) + "\n"

@@ -65,7 +65,8 @@ class Caller:
         frame = self._link.receive(timeout)
         if frame is None:
             return None
-        node = frame.id & 0xF
+        number, _ = frame
+        node = number & 0xF
         try:
             message = unpack(frame, node)
         except CorruptFrameError:

@@ -17,11 +17,11 @@ from dcmp_hil.backends.serial_link import path_of
 from dcmp_hil.backends.slcan_bus import SlcanBus
 from dcmp_hil.config.backends import Can as CanSettings
 from dcmp_hil.errors import ConfigError, DcmpError, LinkError, OpenError
-from dcmp_hil.wire.frame import Frame
 
 if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.wire.frame import Frame
 
 FAILURES = (
     can.CanError,
@@ -121,7 +121,8 @@ class CanLink:
         LinkError
             If the interface failed.
         """
-        message = can.Message(arbitration_id=frame.id, data=frame.data, is_extended_id=False, check=False)
+        number, data = frame
+        message = can.Message(arbitration_id=number, data=data, is_extended_id=False, check=False)
         try:
             self._opened().send(message, timeout=0)
         except can.CanOperationError as error:
@@ -160,7 +161,7 @@ class CanLink:
                 if message.is_error_frame:
                     self._check_bus(message)
                 elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
-                    return Frame(message.arbitration_id, bytes(message.data))
+                    return message.arbitration_id, bytes(message.data)
         except FAILURES as error:
             raise self._broken(error) from error
         return None

@@ -15,10 +15,11 @@ import can
 from dcmp_hil.backends.serial_link import FAILURES, open_port, write_now
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import slcan
-from dcmp_hil.wire.frame import Frame
 
 if TYPE_CHECKING:
     import serial
+
+    from dcmp_hil.wire.frame import Frame
 
 _CHUNK = 4096
 _OURS = b"NDCMP\r"  # what a device of this project answers to N
@@ -78,7 +79,7 @@ class SlcanBus(can.BusABC):
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - never waits
         """Send a frame; what the port has no room for is dropped."""
-        write_now(self._port, slcan.encode(Frame(msg.arbitration_id, bytes(msg.data))))
+        write_now(self._port, slcan.encode((msg.arbitration_id, bytes(msg.data))))
 
     def fileno(self) -> int:
         """Return the descriptor of the port, to wait on."""
@@ -106,5 +107,5 @@ class SlcanBus(can.BusABC):
             self._frames.extend(self._receiver.feed(data))
         if not self._frames:
             return None, False
-        frame = self._frames.popleft()
-        return can.Message(arbitration_id=frame.id, data=frame.data, is_extended_id=False), False
+        number, data = self._frames.popleft()
+        return can.Message(arbitration_id=number, data=data, is_extended_id=False), False

@@ -11,7 +11,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.display import display_available
 
-_LOOK = 0.5  # s
+_PAUSE = 0.5  # s
 
 
 def attach(port: int | None, *, web: bool) -> None:
@@ -23,7 +23,7 @@ def attach(port: int | None, *, web: bool) -> None:
         If nothing is served there, or there are several, or there is no display for a window.
     """
     place = find_served() if port is None else port
-    if not window.speaks_http2(place, _LOOK):
+    if not window.speaks_http2(place):
         raise ConfigError(
             f"Nobody serves a run on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
         )
@@ -59,5 +59,5 @@ def find_served() -> int:
 
 def _until_it_ends(port: int) -> None:
     with suppress(KeyboardInterrupt):
-        while window.speaks_http2(port, _LOOK):
-            pause(_LOOK)
+        while window.speaks_http2(port):
+            pause(_PAUSE)

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
-_PROBE = 0.4  # s
 _SERVER_START = 3.0  # s
 _CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
 _FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
@@ -179,7 +178,7 @@ class RerunSink:
         return outlet
 
     def _connect(self) -> None:
-        if window.speaks_http2(window.PORT, _PROBE):
+        if window.speaks_http2(window.PORT):
             self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)), _FAREWELL)
             return
         self.warnings.append(

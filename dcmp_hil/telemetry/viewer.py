@@ -14,7 +14,7 @@ from dcmp_hil.clock import MonotonicClock, pause
 LOOPBACK = "127.0.0.1"
 PORT, WEB_PORT = 9876, 9090
 _PORTS_TRIED = 50
-_SERVES = 0.4  # s; where nobody listens the answer is there at once
+_BUSY = 3.0  # s that a server may take on a busy computer; where nobody listens, that is known at once
 _LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
@@ -59,7 +59,7 @@ def answers(port: int, within: float) -> bool:
             return True
 
 
-def speaks_http2(port: int, within: float) -> bool:
+def speaks_http2(port: int, within: float = _BUSY) -> bool:
     """Tell whether a server answers on `port`, as a viewer does; one that is frozen only accepts."""
     try:
         with socket.create_connection((LOOPBACK, port), timeout=within) as connection:
@@ -130,7 +130,7 @@ def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
 
 def served(first: int = PORT) -> list[int]:
     """Return the ports on which somebody serves a recording, among those that a run would take."""
-    return [port for port in range(first, first + _PORTS_TRIED) if speaks_http2(port, _SERVES)]
+    return [port for port in range(first, first + _PORTS_TRIED) if speaks_http2(port)]
 
 
 def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from fastcrc import crc8
 
 from dcmp_hil.wire import messages
-from dcmp_hil.wire.frame import Frame
 from dcmp_hil.wire.messages import Drive, Edge, Identity, SampleReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 
 
@@ -133,7 +133,7 @@ def pack(message: Message, node: int = 0) -> Frame:
         body = to_bytes(message)
     except error as cause:
         raise ValueError(f"{type(message).__name__}: {_misfit(message, to_bytes)}") from cause
-    return _new(Frame, (number, body + _BYTE[_crc(body, _ID_CRC[number])]))
+    return number, body + _BYTE[_crc(body, _ID_CRC[number])]
 
 
 def _misfit(message: Any, to_bytes: Callable[[Any], bytes]) -> str:

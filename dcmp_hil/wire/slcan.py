@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
-from dcmp_hil.wire.frame import Frame
+if TYPE_CHECKING:
+    from dcmp_hil.wire.frame import Frame
 
 _LONGEST = 31  # bytes of a line without its CR
 _LINE = re.compile(rb"t([0-7][0-9A-F]{2})([1-8])((?:[0-9A-F]{2})+)")
@@ -14,7 +16,8 @@ _BYTES_BEFORE = 5
 
 def encode(frame: Frame) -> bytes:
     """Return the line of a frame, its CR included."""
-    return b"t%03X%d%s\r" % (frame.id, len(frame.data), frame.data.hex().upper().encode())
+    number, data = frame
+    return b"t%03X%d%s\r" % (number, len(data), data.hex().upper().encode())
 
 
 class Receiver:
@@ -58,4 +61,4 @@ def _decode(line: bytes) -> Frame | None:
     found = _LINE.fullmatch(line)
     if found is None or len(line) != _BYTES_BEFORE + 2 * int(found[2]):
         return None
-    return Frame(int(found[1], 16), bytes.fromhex(found[3].decode()))
+    return int(found[1], 16), bytes.fromhex(found[3].decode())

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
-from dcmp_hil.wire.frame import Frame
 from dcmp_hil.wire.messages import Drive, Hello, Identity, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from sim_backend.fault_kinds.effect import Effect, Kind, Number
@@ -15,6 +14,7 @@ from sim_backend.fault_kinds.wire import WireEffect
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
     from sim_backend.board import Board
     from sim_backend.fault_kinds.wire import Way
@@ -93,13 +93,14 @@ class OtherVersion(WireEffect):
 
     def _frames(self, piece: bytes) -> list[Frame]:
         if self.setup.carrier == "can":
-            return [Frame(int.from_bytes(piece[:2], "little"), piece[2:])]
+            return [(int.from_bytes(piece[:2], "little"), piece[2:])]
         frames: list[Frame] = _CARRIERS[self.setup.carrier].Receiver().feed(piece)
         return frames
 
     def _piece(self, frame: Frame) -> bytes:
         if self.setup.carrier == "can":
-            return frame.id.to_bytes(2, "little") + frame.data
+            number, data = frame
+            return number.to_bytes(2, "little") + data
         encoded: bytes = _CARRIERS[self.setup.carrier].encode(frame)
         return encoded
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.wire.frame import Frame
 from sim_backend.sim_board import BoardLink
 
 if TYPE_CHECKING:
+    from dcmp_hil.wire.frame import Frame
     from sim_backend.board import Board
     from sim_backend.fault_kinds.injection import Injection
     from sim_backend.pace import Pace
@@ -35,7 +35,8 @@ class FaultyLink(BoardLink):
 
     def send(self, frame: Frame) -> None:
         """Hand a frame, or what is left of it, to the board."""
-        piece = frame.id.to_bytes(2, "little") + frame.data if self._encode is None else self._encode(frame)
+        number, data = frame
+        piece = number.to_bytes(2, "little") + data if self._encode is None else self._encode(frame)
         for arriving in self._injection.passed(piece, "up"):
             self._deliver(arriving)
 
@@ -81,4 +82,4 @@ class FaultyLink(BoardLink):
 
 def _frame(piece: bytes) -> Frame:
     """Make the frame of a piece, however damaged."""
-    return Frame(int.from_bytes(piece[:2], "little") & _HIGHEST, piece[2 : 2 + _LONGEST])
+    return int.from_bytes(piece[:2], "little") & _HIGHEST, piece[2 : 2 + _LONGEST]

@@ -15,7 +15,6 @@ from dcmp_hil.backends.serial_link import SerialLink
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
 from dcmp_hil.errors import ConfigError, DcmpError, OpenError
-from dcmp_hil.wire.frame import Frame
 from tests.backends.line import line
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def test_link_that_only_listens_writes_what_is_sent_and_nothing_else(carrier: st
         link.open()
         assert link.receive(0.02) is None
         assert far.heard() == b""
-        link.send(Frame(0x0C0, b"\1"))
+        link.send((0x0C0, b"\1"))
         said = far.heard()
         assert said
         link.close()

@@ -14,7 +14,6 @@ from dcmp_hil.backends.can_link import CanLink
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
 from dcmp_hil.errors import LinkError, OpenError
-from dcmp_hil.wire.frame import Frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -111,7 +110,7 @@ def test_interface_that_fails_at_the_first_look_is_closed_again(
     assert interface.shut
 
 
-@pytest.mark.parametrize("act", [lambda link: link.receive(0.0), lambda link: link.send(Frame(1, b""))])
+@pytest.mark.parametrize("act", [lambda link: link.receive(0.0), lambda link: link.send((1, b""))])
 def test_interface_that_goes_down_is_named_with_its_command(
     act: Callable[[CanLink], object], link: Callable[..., tuple[CanLink, Interface]]
 ) -> None:
@@ -139,4 +138,4 @@ def test_frame_behind_errors_is_found(link: Callable[..., tuple[CanLink, Interfa
     ours = can.Message(arbitration_id=0x20, data=b"\1", is_extended_id=False)
     made, _ = link(None, *[error_frame(NOT_ACKNOWLEDGED)] * 50, ours, None)
     made.open()
-    assert made.receive(0.0) == Frame(0x20, b"\1")
+    assert made.receive(0.0) == (0x20, b"\1")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     import pytest
 
+_MAIN = "from dcmp_hil.cli import main\nmain()"
 BOUND = 60.0  # s: generous, these machines are shared
 
 
@@ -31,10 +32,14 @@ def own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @contextmanager
-def started(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Start `dcmp-hil` with arguments; whatever becomes of it, it is gone in the end."""
+def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subprocess.Popen[str]]:
+    """Start `dcmp-hil` with arguments; whatever becomes of it, it is gone in the end.
+
+    `first` is the first of the ports on which recordings are served, and looked for.
+    """
+    ports = f"for find in (viewer.free_port, viewer.served): find.__defaults__ = ({first},)"
     process = subprocess.Popen(
-        [sys.executable, "-m", "dcmp_hil", *arguments],
+        [sys.executable, "-c", f"from dcmp_hil.telemetry import viewer\n{ports}\n{_MAIN}", *arguments],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         stdout=subprocess.PIPE,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.signals import ERROR, VOLTAGE
 from tests.live.processes import own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 _REPORTS = Path("reports")
+_FIRST = 22_000  # of the ports; no other test serves there
 _RUN = ("run", "bench-1khz", "--viewer", "serve", "--no-record", "--duration", "0")
 
 
@@ -41,11 +43,12 @@ def _coloured(page: Chrome, colour: tuple[int, int, int]) -> int:
 
 def test_the_dashboard_is_drawn_in_the_panel(tmp_path: Path) -> None:
     with (
-        started(tmp_path, *_RUN) as run,
+        started(tmp_path, *_RUN, first=_FIRST) as run,
         browser(tmp_path / "chromium", draws=True) as page,
     ):
         until_running(run)
-        with started(tmp_path, "panel", "--web", "--port", str(free_port())) as panel:
+        until(lambda: window.served(_FIRST), "the run was served")
+        with started(tmp_path, "panel", "--web", "--port", str(free_port()), first=_FIRST) as panel:
             page.get(address_of(panel))
             until(lambda: _coloured(page, VOLTAGE) > 50, "the voltage was drawn")
             until(lambda: _coloured(page, ERROR) > 50, "the tracking error was drawn")

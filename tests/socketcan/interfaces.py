@@ -14,7 +14,6 @@ import tty
 from typing import TYPE_CHECKING
 
 from dcmp_hil.wire import slcan
-from dcmp_hil.wire.frame import Frame
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -118,9 +117,9 @@ class Bridge:
 
     def _to_bus(self) -> None:
         for received in self._receiver.feed(os.read(self._line, _CHUNK)):
-            self._raw.send(frame(received.id, received.data))
+            self._raw.send(frame(*received))
 
     def _to_device(self) -> None:
         identifier, length, data = _FRAME.unpack(self._raw.recv(_FRAME.size))
         if identifier < 1 << 11:
-            os.write(self._line, slcan.encode(Frame(identifier, data[:length])))
+            os.write(self._line, slcan.encode((identifier, data[:length])))

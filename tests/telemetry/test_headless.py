@@ -156,7 +156,7 @@ sys.exit(len(sink.warnings))
 
 
 def test_a_viewer_that_freezes_keeps_neither_the_process_nor_the_file(tmp_path: Path) -> None:
-    port = window.free_port(25_000)
+    port = window.free_port(21_000)
     assert port is not None
     options = ["--headless", "--bind", window.LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     with subprocess.Popen(

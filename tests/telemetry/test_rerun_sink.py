@@ -193,7 +193,7 @@ def test_connect_to_somebody_who_accepts_and_says_nothing_warns(monkeypatch: pyt
         mute.bind((window.LOOPBACK, 0))
         mute.listen()
         monkeypatch.setattr(window, "PORT", mute.getsockname()[1])
-        assert window.answers(window.PORT, 0.5)
+        assert window.answers(window.PORT, 10.0)
         sink = RerunSink(VIEW, None, "connect")
     assert "goes on without one" in sink.warnings[0]
     sink.close()
@@ -228,7 +228,7 @@ def test_a_busy_port_is_passed_over() -> None:
         found = window.free_port(port)
         assert found is not None
         assert found > port
-        assert window.answers(port, 0.5)
+        assert window.answers(port, 10.0)
 
 
 def test_no_free_port_and_a_missing_viewer_are_warnings(monkeypatch: pytest.MonkeyPatch) -> None:

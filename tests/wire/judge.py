@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from dcmp_hil.wire import messages
 from dcmp_hil.wire.codec import CorruptFrameError, unpack
-from dcmp_hil.wire.frame import Frame
 from tests.firmware.bench import database, encode, unstuff
 
 if TYPE_CHECKING:
     from cantools.database.can import Signal
 
+    from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 
 KINDS: dict[str, Any] = {
@@ -82,13 +82,13 @@ def make(name: str, fields: dict[str, int]) -> Message:
 def frames(draw: st.DrawFn) -> Frame:
     """Draw a genuine frame of any message and node."""
     name = draw(st.sampled_from(NAMES))
-    return Frame(*encode(name, draw(NODES), **draw(fields_of(name))))
+    return encode(name, draw(NODES), **draw(fields_of(name)))
 
 
 def understood(frame: Frame) -> Message | None:
     """Return the message in a frame, whichever node's; None if there is none or its crc8 is wrong."""
     try:
-        return unpack(frame, frame.id & 0xF)
+        return unpack(frame, frame[0] & 0xF)
     except CorruptFrameError:
         return None
 
@@ -101,7 +101,7 @@ def read_cobs(stream: bytes) -> tuple[list[Frame], int]:
         body = unstuff(chunk) if len(chunk) <= 13 else b""
         number = int.from_bytes(body[:2], "little")
         if 5 <= len(body) <= 12 and number < 0x800 and body[-2:] == crc16(body[:-2]).to_bytes(2, "little"):
-            found.append(Frame(number, body[2:-2]))
+            found.append((number, body[2:-2]))
         else:
             corrupt += 1
     return found, corrupt
@@ -114,7 +114,7 @@ def read_slcan(stream: bytes) -> tuple[list[Frame], int]:
     for line in lines:
         bare = line.lstrip(b"\x07")  # an adapter's "no", which has no CR
         if len(line) <= 31 and _well_formed(bare):
-            found.append(Frame(int(bare[1:4], 16), bytes.fromhex(bare[5:].decode())))
+            found.append((int(bare[1:4], 16), bytes.fromhex(bare[5:].decode())))
         elif len(line) > 31 or not (bare in (b"", b"z", b"Z") or _is_answer(bare)):
             corrupt += 1
     return found, corrupt

@@ -9,13 +9,14 @@ import pytest
 
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.frame import Frame
 from dcmp_hil.wire.messages import ParameterSet
 from tests.firmware.bench import encode
 from tests.wire.judge import NAMES, signals, span, understood
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from dcmp_hil.wire.frame import Frame
 
 pytestmark = pytest.mark.usefixtures("untraced")
 
@@ -30,7 +31,7 @@ def _frames(name: str) -> list[Frame]:
         for signal in signals(name):
             raw = fill & ((1 << signal.length) - 1)
             fields[signal.name] = raw - (raw > span(signal)[1]) * (1 << signal.length)
-        made.append(Frame(*encode(name, 15 * (turn % 2), **fields)))
+        made.append(encode(name, 15 * (turn % 2), **fields))
     return made
 
 
@@ -45,7 +46,7 @@ def _passed(carrier: Any, frame: Frame, bits: int) -> tuple[int, int]:
 
     Two of them follow: one may be swallowed with a delimiter.
     """
-    marker = pack(ParameterSet(0xABCD, 3, 0x00C0FFEE), frame.id & 0xF)
+    marker = pack(ParameterSet(0xABCD, 3, 0x00C0FFEE), frame[0] & 0xF)
     good = carrier.encode(frame)
     after, length, number = 2 * carrier.encode(marker), len(good), int.from_bytes(good, "little")
     feed, tried, passed = carrier.Receiver().feed, 0, 0
@@ -66,12 +67,12 @@ def test_can(name: str, bits: int) -> None:
     """Identifier and payload: never a message, whichever node it would be for."""
     for frame in _frames(name):
         assert understood(frame) is not None
-        length = len(frame.data)
-        number = frame.id | int.from_bytes(frame.data, "little") << 11
+        length = len(frame[1])
+        number = frame[0] | int.from_bytes(frame[1], "little") << 11
         tried = 0
         for flip in _flips(11 + 8 * length, bits):
             damaged = number ^ flip
-            assert understood(Frame(damaged & 0x7FF, (damaged >> 11).to_bytes(length, "little"))) is None
+            assert understood((damaged & 0x7FF, (damaged >> 11).to_bytes(length, "little"))) is None
             tried += 1
         size = 11 + 8 * length
         assert tried == (size if bits == 1 else size * (size - 1) // 2)

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.frame import Frame
 from dcmp_hil.wire.messages import Health, Hello
 from tests.firmware.bench import cobs_wire, slcan_wire, stuff
 from tests.wire.judge import crc16, frames, read_cobs, read_slcan, understood
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from dcmp_hil.wire.frame import Frame
 
 EXAMPLES = settings(deadline=None, max_examples=150)
 FIRST, SECOND = pack(Hello(0x1200, 0x00C0FFEE), 3), pack(Health(0, 1, 0, 255, 0, 99), 3)
@@ -60,7 +61,7 @@ def _pieces(stream: bytes, sizes: list[int]) -> list[bytes]:
 def _receive(carrier: Carrier, *pieces: bytes) -> tuple[list[Frame], int]:
     receiver = carrier.module.Receiver()
     found = [frame for piece in pieces for frame in receiver.feed(piece)]
-    assert all(type(frame) is Frame and type(frame.data) is bytes for frame in found)
+    assert all(type(frame) is tuple and type(frame[1]) is bytes for frame in found)
     return found, receiver.corrupt
 
 
@@ -111,7 +112,7 @@ SIZES = st.lists(st.integers(1, 40), min_size=1, max_size=6)
 @given(st.data())
 def test_written_as_others_write_it(carrier: Carrier, data: st.DataObject) -> None:
     """Any frame of CAN with a payload, ours or not."""
-    frame = Frame(data.draw(st.integers(0, 0x7FF)), data.draw(st.binary(min_size=1, max_size=8)))
+    frame = (data.draw(st.integers(0, 0x7FF)), data.draw(st.binary(min_size=1, max_size=8)))
     assert carrier.module.encode(frame) == carrier.wire(*frame)
     assert _receive(carrier, carrier.wire(*frame)) == ([frame], 0)
 
@@ -219,20 +220,20 @@ def test_frames_of_every_length_that_cobs_may_not_have() -> None:
     """With a right crc16, all of them."""
     for length in range(20):
         body = bytes(range(1, length + 1))
-        expected = ([Frame(0x201, body[2:])], 0) if 3 <= length <= 10 else ([], 1)
+        expected = ([(0x201, body[2:])], 0) if 3 <= length <= 10 else ([], 1)
         assert _receive(COBS, stuff(body)) == expected
     for number in (0x7FF, 0x800, 0xFFFF):
-        expected = ([], 1) if number > 0x7FF else ([Frame(number, b"x")], 0)
+        expected = ([], 1) if number > 0x7FF else ([(number, b"x")], 0)
         assert _receive(COBS, stuff(number.to_bytes(2, "little") + b"x")) == expected
 
 
 def test_every_wrong_crc16() -> None:
-    body = FIRST.id.to_bytes(2, "little") + FIRST.data
+    body = FIRST[0].to_bytes(2, "little") + FIRST[1]
     assert stuff(body) == cobs.encode(FIRST)
     receiver = cobs.Receiver()
     assert not any(receiver.feed(stuff(body, spoil)) for spoil in range(1, 0x10000, 7))
     assert receiver.corrupt == len(range(1, 0x10000, 7))
-    assert crc16(body) == int.from_bytes(cobs.encode(Frame(FIRST.id, FIRST.data))[-3:-1], "little")
+    assert crc16(body) == int.from_bytes(cobs.encode((FIRST[0], FIRST[1]))[-3:-1], "little")
 
 
 @pytest.mark.parametrize("answer", ANSWERS)
@@ -295,4 +296,4 @@ def test_bells_are_counted_the_same_in_any_pieces(bells: int) -> None:
     ],
 )
 def test_lines_that_are_corrupt(line: bytes) -> None:
-    assert _receive(SLCAN, b"t0401AA\r" + line + b"\rt0401AA\r") == (2 * [Frame(0x40, b"\xaa")], 1)
+    assert _receive(SLCAN, b"t0401AA\r" + line + b"\rt0401AA\r") == (2 * [(0x40, b"\xaa")], 1)
