@@ -1,12 +1,18 @@
 """Fixtures for every test, and the figures that tests measure, at the end of what is printed."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 
 import pytest
 
+from tools import screenshot
+
 FIGURE = "figure"
 _LONG = ("tests/stateful/", "tests/socketcan/", "tests/target/", "tests/firmware/test_")  # minutes, alone
+
+# Between the look for a free port and its use another worker could take it.
+screenshot.FIRST_PORT += 100 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 
 
 @pytest.fixture

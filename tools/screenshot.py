@@ -30,7 +30,7 @@ _START = 30.0  # s: the first picture of a software renderer takes a while
 _LOAD = 60.0  # s
 _SETTLE = 0.7  # s after a seek
 _GREETING_GONE = 5.0  # s after the start, the viewer's first notice leaves the picture
-_FIRST_PORT = 21_000
+FIRST_PORT = 21_000  # tried for the viewer's remote control
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +57,9 @@ def headless_viewer(*sources: str, size: str = "1600x900") -> Iterator[ViewerCli
     """Run a viewer without a window on `sources` (files or addresses), and hand out its remote control."""
     from rerun.experimental import ViewerClient
 
-    port = free_port(_FIRST_PORT)
+    port = free_port(FIRST_PORT)
     if port is None:
-        raise OSError(f"no free port from {_FIRST_PORT} on")
+        raise OSError(f"no free port from {FIRST_PORT} on")
     options = ["--headless", "--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     options += ["--window-size", size, "--memory-limit", "1GB"]
     with subprocess.Popen(  # noqa: S603 - the binary of our own dependency

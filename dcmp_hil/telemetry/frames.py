@@ -95,7 +95,9 @@ class Frames:
 
     def _changed(self, event: Event) -> list[Call]:
         changed = self._parameters.take(event)
-        return [] if changed is None else self._table(event.t, changed)
+        if changed is None:
+            return []
+        return [*self._table(event.t, changed), *self._tuned(np.array([event.t]))]
 
     def _table(self, t: float, numbers: dict[str, float]) -> list[Call]:
         times = self._times(np.array([t]))

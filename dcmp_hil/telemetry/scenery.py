@@ -41,6 +41,11 @@ LANES = {
 """Lanes of the timeline of states, with the colour of each state."""
 
 _WIDTHS = {TRUE: 5.0, ESTIMATE: 3.2, REFERENCE: 1.6, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
+_APART = (
+    *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
+    *((237, 201, 72), (176, 122, 161), (255, 157, 167), (156, 117, 95), (186, 176, 172)),
+)
+"""Colours of lines that only have to differ."""
 _LENGTH = 1.0
 _FRONT = 0.12  # the arm moves before the dial
 
@@ -107,7 +112,12 @@ def _log_about(stream: rr.RecordingStream, rig: RigView) -> None:
 
 def _style_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
     names = Parameters(rig.parameters, rig.kinds).drawn
-    style = rr.SeriesLines(names=list(names), widths=[1.6] * len(names), interpolation_mode="StepAfter")
+    style = rr.SeriesLines(
+        names=list(names),
+        colors=[_APART[k % len(_APART)] for k in range(len(names))],
+        widths=[1.6] * len(names),
+        interpolation_mode="StepAfter",
+    )
     stream.log(RELATIVE, style, static=True)
 
 

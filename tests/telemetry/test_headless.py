@@ -17,6 +17,7 @@ from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
 from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
+from tools import screenshot as screenshots
 from tools.screenshot import APT, headless_viewer, look, screenshot, wait_until_loaded
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ sys.exit(len(sink.warnings))
 
 
 def test_a_viewer_that_freezes_keeps_neither_the_process_nor_the_file(tmp_path: Path) -> None:
-    port = window.free_port(21_000)
+    port = window.free_port(screenshots.FIRST_PORT)
     assert port is not None
     options = ["--headless", "--bind", window.LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     with subprocess.Popen(
