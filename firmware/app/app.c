@@ -86,19 +86,22 @@ uint8_t app_frame_end(const struct app *app)
     return app->port.carrier == DCMP_CARRIER_COBS ? 0u : (uint8_t)'\r';
 }
 
-static void count_frames(struct app *app, const uint8_t *bytes, size_t length)
+/* Whether a frame has ended in these bytes, good or bad. */
+static bool has_frame(struct app *app, const uint8_t *bytes, size_t length)
 {
+    bool ended = false;
     const uint8_t end = app_frame_end(app);
     for (size_t i = 0; i < length; i++) {
         if (bytes[i] != end) {
             app->inside = true;
         } else if (app->inside) {
             app->inside = false;
-            app->frames++;
+            ended = true;
         } else {
             /* an end behind an end */
         }
     }
+    return ended;
 }
 
 struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us)
@@ -111,7 +114,9 @@ struct dcmp_output app_serve_bytes(struct app *app, uint32_t now_us)
     if (!ring_put(&app->sending, replies, replied)) {
         dcmp_device_overrun(&app->device);
     }
-    count_frames(app, bytes, length);
+    if (has_frame(app, bytes, length) && !dcmp_device_waits(&app->device)) {
+        app->answers++;
+    }
     app->life.receptions++;
     app_say(app);
     return app_settle(app, now_us);

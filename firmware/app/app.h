@@ -36,8 +36,8 @@ struct app {
     volatile uint8_t idle_percent;
     struct life life;
     struct fault_log *log;
-    volatile uint32_t frames; /* whole ones that came in over the byte port, good or bad */
-    bool inside;              /* of one that has begun */
+    volatile uint32_t answers; /* frames over the byte port that left the device with nothing to wait for */
+    bool inside;               /* of a frame that has begun */
     int32_t boot_count;
     int32_t failure; /* what was wrong at the start, until it was said */
     bool faulted;

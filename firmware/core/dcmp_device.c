@@ -98,12 +98,16 @@ static struct dcmp_output output(const struct dcmp_device *device)
     return now;
 }
 
+static bool is_live(const struct dcmp_device *device)
+{
+    return device->supervisor.state == DCMP_ARMING || device->supervisor.state == DCMP_RUN;
+}
+
 static bool missed_drive(struct dcmp_device *device)
 {
-    const enum dcmp_state state = device->supervisor.state;
     const bool missed = !device->driven;
     device->driven = false;
-    if (missed && (state == DCMP_ARMING || state == DCMP_RUN)) {
+    if (missed && is_live(device)) {
         dcmp_health_count(&device->health.report.sequence_gaps);
     }
     return missed;
@@ -142,6 +146,11 @@ struct dcmp_output dcmp_device_output(struct dcmp_device *device, uint32_t now_u
 {
     dcmp_guard_time(device, now_us);
     return output(device);
+}
+
+bool dcmp_device_waits(const struct dcmp_device *device)
+{
+    return is_live(device) && device->session.seq != (device->tick & DCMP_SEQ_MASK);
 }
 
 void dcmp_device_late_tick(struct dcmp_device *device)

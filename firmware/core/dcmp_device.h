@@ -72,6 +72,9 @@ struct dcmp_output dcmp_device_tick(struct dcmp_device *device, uint32_t now_us,
 /* What the amplifier has to do now; looks at the watchdog. For use between ticks, as often as one likes. */
 struct dcmp_output dcmp_device_output(struct dcmp_device *device, uint32_t now_us);
 
+/* Whether it is armed, and no DRIVE that was computed from the newest SAMPLE has been accepted. */
+bool dcmp_device_waits(const struct dcmp_device *device);
+
 /* The board's own measurements, for HEALTH: a tick that came late, and the idle share. */
 void dcmp_device_late_tick(struct dcmp_device *device);
 void dcmp_device_idle(struct dcmp_device *device, uint8_t percent);

@@ -18,7 +18,17 @@ from dcmp_hil.errors import ConfigError, LinkError, OpenError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack, unpack
-from dcmp_hil.wire.messages import Drive, Health, Hello, Parameter, ParameterGet, ParameterValue, State, Stop
+from dcmp_hil.wire.messages import (
+    Drive,
+    Health,
+    Hello,
+    Parameter,
+    ParameterGet,
+    ParameterValue,
+    SampleReport,
+    State,
+    Stop,
+)
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from sim_backend.device import VirtualDevice
 from tests.contract.benches import PatientClock
@@ -128,6 +138,25 @@ def test_same_run_is_the_same_to_the_bit_over_every_carrier() -> None:
     assert max(abs(voltage) for _, _, voltage in first) > 2.0
     assert [round(1e3 * t) for t, _, _ in first] == list(range(1000))
     assert ended == State.IDLE
+
+
+def test_answer_to_an_earlier_sample_is_none_to_the_newest() -> None:
+    """Else a host that was late once while it armed is one tick behind for a whole run."""
+    with VirtualDevice(bench(), patience_ms=_PATIENT_MS) as device, connected(device) as host:
+        device.start()
+        host.say(Hello(SESSION, PROTOCOL_HASH))
+        for _ in range(100):
+            samples = [message for message in host.hear() if isinstance(message, SampleReport)]
+            if samples and samples[-1].state == State.RUN:
+                break
+            if samples:
+                host.seq = samples[-1].tick
+                host.drive(0)  # the last one is for the tick before the one that was heard of last
+        host.drive(0)
+        assert not any(isinstance(message, SampleReport) for message in host.hear(0.1))
+        host.seq += 1
+        host.drive(0)
+        assert any(isinstance(message, SampleReport) for message in host.hear())
 
 
 def test_host_that_hangs_up_leaves_0_V_within_2_ms_of_the_firmware_s_clock(device: VirtualDevice) -> None:

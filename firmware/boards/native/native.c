@@ -40,7 +40,7 @@ struct board {
     bool link_up;
     uint8_t rest[ROOM]; /* of frames that have begun to go out */
     size_t rest_length;
-    bool heard; /* a frame from the host, since the newest tick */
+    bool answered; /* by the host, since the newest tick */
     bool inside; /* a frame that has begun */
     uint8_t frame_end;
     bool plant_time;
@@ -161,18 +161,21 @@ static void send_all(struct board *board)
     send(board, bytes, length);
 }
 
-static void count_frames(struct board *board, const uint8_t *bytes, size_t length)
+/* Whether a frame has ended in these bytes, good or bad. */
+static bool has_frame(struct board *board, const uint8_t *bytes, size_t length)
 {
+    bool ended = false;
     for (size_t i = 0; i < length; i++) {
         if (bytes[i] != board->frame_end) {
             board->inside = true;
         } else if (board->inside) {
             board->inside = false;
-            board->heard = true;
+            ended = true;
         } else {
             /* an end behind an end */
         }
     }
+    return ended;
 }
 
 static void link_opened(struct board *board)
@@ -198,9 +201,10 @@ static void serve_link(struct board *board)
     } else {
         uint8_t replies[ROOM];
         const size_t got = (size_t)length;
-        count_frames(board, bytes, got);
+        const bool whole = has_frame(board, bytes, got);
         const size_t replied =
             dcmp_port_receive(&board->port, &board->device, bytes, got, now_us(board), replies, sizeof replies);
+        board->answered = board->answered || (whole && !dcmp_device_waits(&board->device));
         send(board, replies, replied);
         send_all(board);
     }
@@ -226,7 +230,7 @@ static void wait_for_host(struct board *board, uint16_t wait_ms)
 {
     const uint64_t until_us = wall_us() + 1000u * (uint64_t)wait_ms;
     uint64_t wall = wall_us();
-    while (!board->heard && board->link_up && wall < until_us) {
+    while (!board->answered && board->link_up && wall < until_us) {
         struct pollfd port = {.fd = board->master, .events = POLLIN};
         if (poll(&port, 1, (int)((until_us - wall + 999u) / 1000u)) > 0) {
             serve_link(board);
@@ -248,7 +252,7 @@ static bool serve_plant(struct board *board)
     board->plant_time = tick.plant_time;
     board->tick_us = tick.now_us;
     board->tick_at_us = wall_us();
-    board->heard = false;
+    board->answered = false;
     look_for_host(board);
     (void)take_output(board, dcmp_device_tick(&board->device, tick.now_us, tick.counts, NULL));
     send_all(board);

@@ -8,7 +8,8 @@
  *    at  type  name
  *     0  u32   now_us     the board's clock at this tick
  *     4  u32   counts     the encoder's counter
- *     8  u16   wait_ms    answer after one whole frame has come from the host, or after so long (wall time); 0: at once
+ *     8  u16   wait_ms    answer once the host has, or after so long (wall time); 0: at once. A device that is armed is
+ *                         answered by a DRIVE computed from this tick's SAMPLE, any other by any frame
  *    10  u8    flags      bit 0, plant time: the board's clock stands still until the next TICK;
  *                         otherwise it runs on with the wall, at most one period
  *    11  u8    0

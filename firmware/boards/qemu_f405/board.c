@@ -118,12 +118,12 @@ static void tell_plant(bool unasked)
     pump(USART2, &board.plant_told);
 }
 
-/* The emulator's wall clock: until a frame came, or for so long. */
-static void wait_for_host(uint32_t frames, uint32_t wait_ms)
+/* The emulator's wall clock: until the host has answered, or for so long. */
+static void wait_for_host(uint32_t answers, uint32_t wait_ms)
 {
     uint32_t ms = 0;
     SYSTICK->VAL = 0;
-    while (ms < wait_ms && board.app.frames == frames) {
+    while (ms < wait_ms && board.app.answers == answers) {
         pump(USART1, &board.app.sending);
         ms += (SYSTICK->CTRL & SYSTICK_CTRL_COUNTFLAG) != 0u ? 1u : 0u;
     }
@@ -143,9 +143,9 @@ static bool plant_rings(uint8_t bytes[PLANT_TICK_BYTES], size_t *length)
 
 static void serve_tick(void)
 {
-    const uint32_t frames = board.app.frames;
+    const uint32_t answers = board.app.answers;
     interrupt_pend(BOARD_TICK_IRQ);
-    wait_for_host(frames, board.tick.wait_ms);
+    wait_for_host(answers, board.tick.wait_ms);
     pump(USART1, &board.app.sending);
     tell_plant(false);
 }

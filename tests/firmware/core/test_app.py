@@ -101,15 +101,22 @@ def test_board_arms_and_drives_over_bytes(core: Core, slcan: bool) -> None:
     board.tick()
     assert board.arm(1500) == (1500, True)
     assert board.state == RUN
-    assert board.app.frames == (14 if slcan else 13)  # HELLO, DRIVEs; slcan's opening
+    answers = board.app.answers
+    assert answers == (14 if slcan else 13)  # HELLO, DRIVEs; slcan's opening
+    board.say("PARAMETER_GET", id=1)
+    assert board.app.answers == answers  # it is armed, and waits for a DRIVE
     board.drive(0, arm=0)
     assert board.tick() == (0, False)
 
 
 def test_empty_frames_are_no_frames(core: Core) -> None:
     board = Board(core)
-    board.hear(b"\0\0\0\x01\0\0")
-    assert board.app.frames == 1
+    board.hear(b"\0\0\0")
+    assert board.app.answers == 0
+    board.hear(b"\x01\0\0")
+    assert board.app.answers == 1
+    board.hear(b"\0")
+    assert board.app.answers == 1
 
 
 def test_fault_is_logged_once_and_survives_a_reset(core: Core) -> None:
@@ -226,9 +233,9 @@ def test_answers_leave_at_once(core: Core) -> None:
 def test_chunk_that_is_full_is_looked_at_to_its_end_and_no_further(core: Core) -> None:
     board = Board(core)
     board.hear(b"\x01\0" * 32 + b"\x01")
-    assert board.app.frames == 32
+    assert board.app.answers == 1
     board.hear(b"\0")
-    assert board.app.frames == 33
+    assert board.app.answers == 2
 
 
 @pytest.mark.parametrize("room", [1024, 30, 1])

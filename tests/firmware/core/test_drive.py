@@ -39,6 +39,39 @@ def test_a_drive_that_lay_in_a_buffer(core: Core, held_ms: int) -> None:
     assert bench.tick()[0] == (4000 if held_ms <= 3 else 5000)
 
 
+def test_it_waits_for_the_answer_to_the_newest_sample(core: Core) -> None:
+    bench = Bench(core)
+
+    def waits() -> bool:
+        return bool(bench.lib.dcmp_device_waits(bench.device))
+
+    bench.hello()
+    bench.tick()
+    assert not waits()  # nobody has armed it
+    assert bench.drive(arm=1, age=1)
+    assert waits()  # ARMING, and that was the answer to the one before
+    assert bench.drive(arm=1)
+    assert not waits()
+    bench.tick()
+    bench.run()
+    assert waits()
+    bench.drive()
+    assert not waits()
+    bench.device.tick = 8191 + 3 * 8192
+    bench.device.session.seq = 8190
+    assert waits()
+    assert bench.drive()
+    assert not waits()
+    bench.tick()
+    assert waits()  # seq begins anew
+    assert bench.drive()
+    assert not waits()
+    bench.tick()
+    assert bench.drive(arm=0)
+    bench.tick()
+    assert not waits()  # IDLE
+
+
 def test_every_delay_from_4_to_500_ms(core: Core) -> None:
     bench = Bench(core)
     bench.hello()
