@@ -36,7 +36,7 @@ struct app {
     volatile uint8_t idle_percent;
     struct life life;
     struct fault_log *log;
-    volatile uint32_t answers; /* frames over the byte port that left the device with nothing to wait for */
+    volatile uint32_t answers; /* times that frames over the byte port left it nothing to wait for */
     bool inside;               /* of a frame that has begun */
     int32_t boot_count;
     int32_t failure; /* what was wrong at the start, until it was said */
