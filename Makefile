@@ -6,9 +6,10 @@ ARGS ?=
 
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip -qq --disable-pip-version-check --no-input
-INSTALL = $(PIP) install --require-hashes --only-binary :all: -r
+# The lock names all there is. --no-deps: pip takes exactly that, and looks for no newer version of anything.
+INSTALL = $(PIP) install --no-deps --require-hashes --only-binary :all: -r
 EDITABLE = $(PIP) install --no-deps --no-build-isolation --editable .
-COMPILE = $(BIN)/uv --quiet pip compile --universal --fork-strategy fewest --python-version 3.11 --generate-hashes \
+COMPILE = $(BIN)/uv --quiet pip compile --universal --no-strip-extras --fork-strategy fewest --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" pyproject.toml --group build
 PYTEST = $(BIN)/python -m pytest -n 2
 
