@@ -1,11 +1,14 @@
 """Fixtures for every test, and the figures that tests measure, at the end of what is printed."""
 
 import os
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
+from tests.installed import Finished, environment, install
 from tools import screenshot
 
 FIGURE = "figure"
@@ -43,3 +46,37 @@ def untraced() -> Iterator[None]:
     sys.settrace(None)
     yield
     sys.settrace(tracer)
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the script `dcmp-hil` of an installed wheel."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    return install(shared / "installed")
+
+
+@pytest.fixture
+def script(installed: Path, tmp_path: Path) -> Callable[..., Finished]:
+    """Run `dcmp-hil` of an installed wheel as a process, in an empty folder unless told otherwise."""
+
+    def run(
+        *arguments: str,
+        cwd: Path = tmp_path,
+        env: dict[str, str | None] | None = None,
+        timeout: float = 120.0,
+        encoding: str = "utf-8",
+    ) -> Finished:
+        done = subprocess.run(
+            [str(installed), *arguments],
+            cwd=cwd,
+            env=environment(**(env or {})),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            encoding=encoding,
+            timeout=timeout,
+            check=False,
+        )
+        return Finished(done.returncode, done.stdout, done.stderr)
+
+    return run
