@@ -1,4 +1,4 @@
-"""The command as a user has it: a wheel, built and installed once for all workers, and run as a process of its own."""
+"""The command of an installed wheel: built once for all workers of a test run, started as a process."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _check(command: list[str], environment: dict[str, str]) -> None:
 
 
 def environment(**changes: str | None) -> dict[str, str]:
-    """Return this process's environment without a display and without what coverage and Python add; None removes."""
+    """Return the environment without a display, coverage and Python settings; None removes a name."""
     dropped = ("DISPLAY", "WAYLAND_DISPLAY", "PYTHONPATH", "PYTHONHOME", "COLUMNS", "MPLBACKEND")
     kept = {
         name: value
