@@ -14,33 +14,72 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dcmp_hil.backends import Backend
+    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig, load_rig
-    from dcmp_hil.errors import BackendError, ConfigError, DcmpError, TripError
+    from dcmp_hil.controllers import Controller, ControllerContext
+    from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
+    from dcmp_hil.model import Model
+    from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.session import Result, run
+    from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.statistics import Summary
+    from dcmp_hil.values import Cycle, Estimate, Event, Fault, Reference, Sample, Truth
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Backend": "dcmp_hil.backends",
     "BackendError": "dcmp_hil.errors",
+    "Clock": "dcmp_hil.clock",
     "ConfigError": "dcmp_hil.errors",
+    "Controller": "dcmp_hil.controllers",
+    "ControllerContext": "dcmp_hil.controllers",
+    "Cycle": "dcmp_hil.values",
     "DcmpError": "dcmp_hil.errors",
+    "DeadlineError": "dcmp_hil.errors",
+    "Estimate": "dcmp_hil.values",
+    "Event": "dcmp_hil.values",
+    "Fault": "dcmp_hil.values",
+    "Model": "dcmp_hil.model",
+    "Observer": "dcmp_hil.observers",
+    "ObserverContext": "dcmp_hil.observers",
+    "Reference": "dcmp_hil.values",
     "Result": "dcmp_hil.session",
     "Rig": "dcmp_hil.config",
+    "Sample": "dcmp_hil.values",
+    "Sink": "dcmp_hil.telemetry.recorder",
     "Summary": "dcmp_hil.telemetry.statistics",
     "TripError": "dcmp_hil.errors",
+    "Truth": "dcmp_hil.values",
     "load_rig": "dcmp_hil.config",
     "run": "dcmp_hil.session",
 }
 
 __all__ = [
+    "Backend",
     "BackendError",
+    "Clock",
     "ConfigError",
+    "Controller",
+    "ControllerContext",
+    "Cycle",
     "DcmpError",
+    "DeadlineError",
+    "Estimate",
+    "Event",
+    "Fault",
+    "Model",
+    "Observer",
+    "ObserverContext",
+    "Reference",
     "Result",
     "Rig",
+    "Sample",
+    "Sink",
     "Summary",
     "TripError",
+    "Truth",
     "__version__",
     "load_rig",
     "run",

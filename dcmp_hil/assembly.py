@@ -96,7 +96,7 @@ def assemble(
 
 def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
     """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
-    setting = observers.Setting(rig.model.values(), rig.period, rig.encoder.counts)
+    setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
     observer: Observer = (
         _make_custom(rig.observer, setting, "observer")
         if isinstance(rig.observer, Custom)
@@ -109,7 +109,7 @@ def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
 
 def make_controller(rig: Rig) -> Controller:
     """Make the controller that `[controller]` asks for."""
-    setting = controllers.Setting(rig.model.values(), rig.period)
+    setting = controllers.ControllerContext(rig.model.values(), rig.period)
     if isinstance(rig.controller, Custom):
         custom: Controller = _make_custom(rig.controller, setting, "controller")
         return custom
@@ -121,7 +121,7 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
     limits = rig.supervisor
     monitors: list[Monitor] = [Finite()]
     if limits.monitors == "all":
-        setting = observers.Setting(rig.model.values(), rig.period, rig.encoder.counts)
+        setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
         watch = SuperTwisting(setting, mu0=min(_WATCH_FLOOR, 0.3 / rig.period))
         monitors += [
             Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
@@ -178,5 +178,5 @@ def _make_custom(section: Custom, setting: object, key: str) -> Any:
     except TypeError as error:
         raise ConfigError(
             f"{key}.kind: {section.kind} could not be made: {error}. "
-            f"It is called as Class(setting, **options) with the keys of [{key}.options]."
+            f"It is called as Class(context, **options) with the keys of [{key}.options]."
         ) from error

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.observers import Setting
+    from dcmp_hil.observers import ObserverContext
     from dcmp_hil.values import Sample
 
     Vector = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Diagnosis:
         What the host believes of the pendulum, and its encoder.
     """
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setting: ObserverContext) -> None:
         self._model, counts = setting.model, setting.counts_per_rev
         self._noise = math.hypot(_NOISE * (math.tau / counts if counts else 0.0), _LEAST)
         self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / setting.period)))

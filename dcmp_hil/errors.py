@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING, ClassVar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dcmp_hil.session import Result
     from dcmp_hil.values import Cycle
 
 
 class DcmpError(Exception):
-    """Base of everything this package raises on purpose."""
+    """Base of everything this package raises on purpose.
+
+    Attributes
+    ----------
+    result
+        Columns, figures and events of the run that it ended; `dcmp_hil.run` fills it in, otherwise None.
+    """
 
     exit_code: ClassVar[int] = 1
+    result: Result | None = None
 
 
 class ConfigError(DcmpError):

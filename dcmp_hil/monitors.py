@@ -11,7 +11,7 @@ from dcmp_hil.faults import meaning_of
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import Observer, Setting
+    from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.values import Estimate, Sample
 
 _HEALTHY = Fault.NONE  # found here faster than in its class
@@ -96,7 +96,9 @@ class DisturbanceWatch:
         s, how long the filtered |w_hat| must stay above the limit.
     """
 
-    def __init__(self, observer: Observer, setting: Setting, limit: float, for_: float = 5e-3) -> None:
+    def __init__(
+        self, observer: Observer, setting: ObserverContext, limit: float, for_: float = 5e-3
+    ) -> None:
         self._diagnosis = Diagnosis(setting)
         self._remember, self._update = self._diagnosis.add, observer.update
         self._keep = math.exp(-setting.period / 10e-3)

@@ -11,7 +11,7 @@ from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
+from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, OpenError, TripError
 from dcmp_hil.host import host_facts, in_words
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.realtime import Grant, RealTime
@@ -290,14 +290,18 @@ def run(
     ConfigError
         If an argument does not fit the rig.
     TripError
-        If the supervisor stopped the run; `.cycles` holds the last second.
+        If the supervisor stopped the run; `.result` holds what there is of it, `.cycles` its last second.
     DeadlineError
-        If `timing` enforces real time that is not granted, or ends a run that is late too often.
+        If `timing` enforces real time that is not granted, or ends a late run; with `.result`.
     BackendError
-        If the device or the way to it fails.
+        If the device or the way to it fails; with `.result`.
     """
     session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks)
-    session.run()
+    try:
+        session.run()
+    except DcmpError as error:
+        error.result = session.result()
+        raise
     return session.result()
 
 

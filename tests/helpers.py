@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import load_rig, run
 from dcmp_hil.model import Model
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.session import Session
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing, Truth
@@ -58,9 +58,9 @@ def known(value: float | None) -> float:
     return value
 
 
-def setting(*, period: float = T, counts: float | None = 4096.0, f0: float = 0.1) -> Setting:
+def setting(*, period: float = T, counts: float | None = 4096.0, f0: float = 0.1) -> ObserverContext:
     """Return an observer's setting with the paper's pendulum."""
-    return Setting(Model(f0=f0), period, counts)
+    return ObserverContext(Model(f0=f0), period, counts)
 
 
 def cycle(
@@ -217,7 +217,7 @@ class LosesSamples(SimBackend):
 class IgnoresGaps:
     """The default observer, made to believe that every sample comes one period after the last."""
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setting: ObserverContext) -> None:
         self._observer, self._period, self._ticks = SuperTwisting(setting), setting.period, 0
 
     def update(self, sample: Sample) -> Estimate:

@@ -9,10 +9,10 @@ import pytest
 
 from dcmp_hil import run
 from dcmp_hil.assembly import make_controller, make_observer
-from dcmp_hil.controllers import Setting as ControllerSetting
+from dcmp_hil.controllers import ControllerContext
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.model import Model
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
@@ -53,14 +53,14 @@ def test_observer_of_ones_own_gets_its_setting_and_its_options() -> None:
     )
     assert isinstance(made, _Mine)
     assert made.gain == 7.0
-    assert made.setting == Setting(Model(f0=0.3), 0.0005, 4096.0)
+    assert made.setting == ObserverContext(Model(f0=0.3), 0.0005, 4096.0)
 
 
 def test_controller_of_ones_own_gets_its_setting_and_its_options() -> None:
     made = make_controller(bench(f"controller.kind={named(_Mine)}", "controller.options.gain=-1"))
     assert isinstance(made, _Mine)
     assert made.gain == -1
-    assert made.setting == ControllerSetting(Model(), 0.001)
+    assert made.setting == ControllerContext(Model(), 0.001)
 
 
 @pytest.mark.parametrize("stage", ["observer", "controller"])
@@ -119,14 +119,14 @@ def test_real_device_is_refused_virtual_time() -> None:
 @pytest.mark.usefixtures("untraced")
 def test_loop_runs_on_an_observer_and_a_controller_of_ones_own() -> None:
     class Position:
-        def __init__(self, setting: Setting) -> None:
+        def __init__(self, setting: ObserverContext) -> None:
             self._inner = SuperTwisting(setting)
 
         def update(self, sample: Sample) -> Estimate:
             return self._inner.update(sample)
 
     class Proportional:
-        def __init__(self, setting: ControllerSetting, kp: float, kd: float) -> None:
+        def __init__(self, setting: ControllerContext, kp: float, kd: float) -> None:
             self._ku, self._kp, self._kd = setting.model.ku, kp, kd
 
         def update(self, reference: Reference, estimate: Estimate) -> float:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil import load_rig, loop, run
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import SimulatedClock
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Cycle, Sample
@@ -99,7 +99,7 @@ def _command_s(*arguments: str) -> float:
 
 def _rows() -> list[Row]:
     bench, coarse = load_rig("bench-1khz"), load_rig("bench-1khz", ["sim.step_us=500"])
-    setting = Setting(bench.model.values(), bench.period, bench.encoder.counts)
+    setting = ObserverContext(bench.model.values(), bench.period, bench.encoder.counts)
     return [
         _row(
             "loop in virtual time, telemetry off, plant step 200 us",

@@ -176,7 +176,7 @@ class RunSection(Section):
 
 
 class Custom(Section):
-    """An observer or a controller of your own: `kind = "module:Class"`, made as Class(setting, **options)."""
+    """An observer or a controller of your own: `kind = "module:Class"`, made as Class(context, **options)."""
 
     kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$", examples=["my_lab.rig:Mine"])]
     """`module:Class`; the module must be importable from where the run is started."""

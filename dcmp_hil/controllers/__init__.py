@@ -14,8 +14,8 @@ class Controller(Protocol):
         ...
 
 
-class Setting(NamedTuple):
-    """What a controller may know of the rig it serves.
+class ControllerContext(NamedTuple):
+    """What a controller is made with: what it may know of the rig it serves.
 
     Parameters
     ----------
@@ -37,4 +37,4 @@ class Gains(NamedTuple):
     compensation: float  # 1 with w_hat, 0 without
 
 
-__all__ = ["Controller", "Gains", "Setting"]
+__all__ = ["Controller", "ControllerContext", "Gains"]

@@ -8,7 +8,7 @@ from dcmp_hil.controllers import Gains
 from dcmp_hil.section import NotNegative, Section
 
 if TYPE_CHECKING:
-    from dcmp_hil.controllers import Setting
+    from dcmp_hil.controllers import ControllerContext
     from dcmp_hil.values import Estimate, Reference
 
 
@@ -30,10 +30,10 @@ class PdSettings(Section):
         """The gains without pydantic, for the loop."""
         return Gains(self.kp_1_s2, self.kd_1_s, float(self.kind == "pd_compensated"))
 
-    def build(self, setting: Setting) -> PdCompensated:
+    def build(self, context: ControllerContext) -> PdCompensated:
         """Make the controller for a rig."""
         return PdCompensated(
-            setting, kp=self.kp_1_s2, kd=self.kd_1_s, compensate=self.kind == "pd_compensated"
+            context, kp=self.kp_1_s2, kd=self.kd_1_s, compensate=self.kind == "pd_compensated"
         )
 
 
@@ -44,7 +44,7 @@ class PdCompensated:
 
     Parameters
     ----------
-    setting
+    context
         The rig served.
     kp, kd
         1/s2 and 1/s; the closed loop's error obeys s^2 + kd s + kp.
@@ -53,10 +53,10 @@ class PdCompensated:
     """
 
     def __init__(
-        self, setting: Setting, *, kp: float = 4000.0, kd: float = 130.0, compensate: bool = True
+        self, context: ControllerContext, *, kp: float = 4000.0, kd: float = 130.0, compensate: bool = True
     ) -> None:
         self._kp, self._kd = kp, kd
-        self._f0, self._volts = setting.model.f0, 1.0 / setting.model.ku
+        self._f0, self._volts = context.model.f0, 1.0 / context.model.ku
         self._compensation = 1.0 if compensate else 0.0
 
     @property

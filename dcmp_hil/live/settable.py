@@ -114,7 +114,7 @@ def _worked_out(before: Rig, after: Rig) -> Change:
         gains = after.controller.gains
     if isinstance(after.observer, SuperTwistingSettings) and after.observer != before.observer:
         tuning = after.observer.tuning(
-            observers.Setting(after.model.values(), after.period, after.encoder.counts)
+            observers.ObserverContext(after.model.values(), after.period, after.encoder.counts)
         )
     reference = after.reference if after.reference != before.reference else None
     return Change(words, gains, tuning, reference)

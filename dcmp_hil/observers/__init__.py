@@ -15,8 +15,8 @@ class Observer(Protocol):
         ...
 
 
-class Setting(NamedTuple):
-    """What an observer may know of the rig it serves.
+class ObserverContext(NamedTuple):
+    """What an observer is made with: what it may know of the rig it serves.
 
     Parameters
     ----------
@@ -41,4 +41,4 @@ def standing_still(before: float, t: float) -> ProtocolError:
     )
 
 
-__all__ = ["Observer", "Setting", "standing_still"]
+__all__ = ["Observer", "ObserverContext", "standing_still"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.observers import Observer, Setting
+    from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.values import Estimate, Reference, Sample
 
@@ -24,7 +24,7 @@ class KnownFriction:
     ----------
     observer
         The one that finds the rest.
-    setting
+    context
         The rig served.
     reference
         The trajectory at any instant.
@@ -33,10 +33,14 @@ class KnownFriction:
     """
 
     def __init__(
-        self, observer: Observer, setting: Setting, reference: Callable[[float], Reference], ahead: float
+        self,
+        observer: Observer,
+        context: ObserverContext,
+        reference: Callable[[float], Reference],
+        ahead: float,
     ) -> None:
         self._observer = observer
-        self._f1, self._volts = setting.model.f1, 1.0 / setting.model.ku
+        self._f1, self._volts = context.model.f1, 1.0 / context.model.ku
         self._reference = reference
         self._ahead = ahead
         self._t = 0.0

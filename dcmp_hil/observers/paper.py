@@ -10,7 +10,7 @@ from dcmp_hil.section import Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import Setting
+    from dcmp_hil.observers import ObserverContext
 
 _LAMBDA1, _LAMBDA2, _LAMBDA3 = 2.0, 1.5, 1.1
 
@@ -28,10 +28,10 @@ class PaperSettings(Section):
     start: Literal["measured", "zero"] = "measured"
     """Where z1 begins: at the first measured position, or at 0 as in the paper."""
 
-    def build(self, setting: Setting) -> PaperObserver:
+    def build(self, context: ObserverContext) -> PaperObserver:
         """Make the observer for a rig."""
         return PaperObserver(
-            setting, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, from_zero=self.start == "zero"
+            context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, from_zero=self.start == "zero"
         )
 
 
@@ -46,7 +46,7 @@ class PaperObserver:
 
     Parameters
     ----------
-    setting
+    context
         The rig served.
     L1, L2, M
         Gains of eq. (14): 1/s, 1/s2, rad/s3.
@@ -56,20 +56,20 @@ class PaperObserver:
 
     def __init__(
         self,
-        setting: Setting,
+        context: ObserverContext,
         *,
         L1: float = 4.9,
         L2: float = 5.51,
         M: float = 1000.0,
         from_zero: bool = False,
     ) -> None:
-        self.f0, self._ku = setting.model.f0, setting.model.ku
+        self.f0, self._ku = context.model.f0, context.model.ku
         self.L1, self.L2 = L1, L2
         self._n1_gain = _LAMBDA1 * M ** (1 / 3)
         self._n2_gain = _LAMBDA2 * math.sqrt(M)
         self._n3_gain = _LAMBDA3 * M
         self._from_zero = from_zero
-        self._restart_after = 10.02 * setting.period
+        self._restart_after = 10.02 * context.period
         self._t = self._y = math.nan
         self._z1 = self._z2 = 0.0
         self.v1 = self.v2 = self.v3 = 0.0

@@ -13,7 +13,7 @@ from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import Setting
+    from dcmp_hil.observers import ObserverContext
 
 _new = tuple.__new__  # half the time of a NamedTuple's own
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
@@ -48,13 +48,13 @@ class SuperTwistingSettings(Section):
     mu0_rad_s: NotNegative | None = Field(default=None)
     """Bandwidth floor, rad/s: the quiet/fast knob; by default from encoder and rate. 0 = no floor."""
 
-    def tuning(self, setting: Setting) -> Tuning:
+    def tuning(self, context: ObserverContext) -> Tuning:
         """Work out what an observer of that rig is retuned with."""
-        return tune(setting, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
+        return tune(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
 
-    def build(self, setting: Setting) -> SuperTwisting:
+    def build(self, context: ObserverContext) -> SuperTwisting:
         """Make the observer for a rig."""
-        return SuperTwisting(setting, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
+        return SuperTwisting(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
 
 
 def bandwidth_floor(counts_per_rev: float | None, period: float) -> float:
@@ -94,7 +94,7 @@ class SuperTwisting:
 
     Parameters
     ----------
-    setting
+    context
         The rig served: believed plant, period (s), encoder.
     L1, L2
         Gains of the copy, 1/s and 1/s2.
@@ -106,17 +106,17 @@ class SuperTwisting:
 
     def __init__(
         self,
-        setting: Setting,
+        context: ObserverContext,
         *,
         L1: float = 4.9,
         L2: float = 5.51,
         M: float | None = None,
         mu0: float | None = None,
     ) -> None:
-        self._period = setting.period
-        self._tolerance = _SAME_STEP * setting.period
-        self._f0, self._ku = setting.model.f0, setting.model.ku
-        self._use(tune(setting, L1=L1, L2=L2, M=M, mu0=mu0))
+        self._period = context.period
+        self._tolerance = _SAME_STEP * context.period
+        self._f0, self._ku = context.model.f0, context.model.ku
+        self._use(tune(context, L1=L1, L2=L2, M=M, mu0=mu0))
         self._t = self._y = math.nan
         self._z1 = self._z2 = self._v1 = self._v2 = self._v3 = 0.0
 
@@ -202,9 +202,9 @@ class SuperTwisting:
         return _per_step(matched_gains(mu * dt), dt)
 
 
-def tune(setting: Setting, *, L1: float, L2: float, M: float | None, mu0: float | None) -> Tuning:
+def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0: float | None) -> Tuning:
     """Work out every coefficient of an observer; the arguments are those of `SuperTwisting`."""
-    counts, period, f0 = setting.counts_per_rev, setting.period, setting.model.f0
+    counts, period, f0 = context.counts_per_rev, context.period, context.model.f0
     M = slope_bound(counts) if M is None else M
     mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
     gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, _LONGEST_GAP + 1)}

@@ -9,7 +9,7 @@ from dcmp_hil.controllers.pd_compensated import PdCompensated
 from dcmp_hil.observers.paper import PaperObserver
 
 if TYPE_CHECKING:
-    from dcmp_hil.controllers import Setting
+    from dcmp_hil.controllers import ControllerContext
     from dcmp_hil.values import Estimate, Reference
 
 
@@ -55,15 +55,15 @@ class PrintedEq10(PdCompensated):
 
     Parameters
     ----------
-    setting
+    context
         The rig served.
     kp, kd
         1/s2 and 1/s.
     """
 
-    def __init__(self, setting: Setting, *, kp: float = 4000.0, kd: float = 130.0) -> None:
-        super().__init__(setting, kp=kp, kd=kd)
-        self._once_more = 1.0 / setting.model.ku
+    def __init__(self, context: ControllerContext, *, kp: float = 4000.0, kd: float = 130.0) -> None:
+        super().__init__(context, kp=kp, kd=kd)
+        self._once_more = 1.0 / context.model.ku
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
         """Return the voltage to ask for, V."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.model import Model
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.plugins import find_named
@@ -45,7 +45,7 @@ class Preparation(NamedTuple):
     """
 
     observer: Observer
-    setting: Setting
+    setting: ObserverContext
     applied: NDArray[np.float64]
     voltage: NDArray[np.float64]
     notes: tuple[str, ...]
@@ -63,7 +63,7 @@ def prepare(recording: Recording, settings: ReplaySettings) -> Preparation:
     period = _period(recording, settings)
     counts, how = _resolution(recording, settings)
     notes = why + how
-    setting = Setting(Model(f0=settings.f0, ku=ku), period, counts)
+    setting = ObserverContext(Model(f0=settings.f0, ku=ku), period, counts)
     observer = _make(settings, setting)
     if isinstance(observer, SuperTwisting) and observer.mu0 * period > 0.3 + 1e-9:
         most = 0.3 / period
@@ -116,7 +116,7 @@ def _resolution(recording: Recording, settings: ReplaySettings) -> tuple[float |
     return counts, (f"Counts per revolution: {counts:.0f} ({why}). --counts-per-rev overrides it.",)
 
 
-def _make(settings: ReplaySettings, setting: Setting) -> Observer:
+def _make(settings: ReplaySettings, setting: ObserverContext) -> Observer:
     if settings.observer == "super_twisting":
         return SuperTwisting(setting, L1=settings.L1, L2=settings.L2, M=settings.M, mu0=settings.mu0)
     if settings.observer == "paper":
@@ -127,7 +127,7 @@ def _make(settings: ReplaySettings, setting: Setting) -> Observer:
         return cast("Observer", make(setting))
     except TypeError as error:
         raise ConfigError(
-            f"--observer: {settings.observer} could not be made: {error}. It is called as Class(setting)."
+            f"--observer: {settings.observer} could not be made: {error}. It is called as Class(context)."
         ) from error
 
 

@@ -24,7 +24,7 @@ class ReplaySettings:
     """
 
     observer: str = "super_twisting"
-    """`super_twisting` (R1), `paper` (R0), or `module:Class` of your own, made as Class(Setting)."""
+    """`super_twisting` (R1), `paper` (R0), or `module:Class` of your own, made as Class(context)."""
     f0: float = 0.1
     """Viscous friction over inertia fd/J, 1/s."""
     inertia: float | None = None

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.controllers import Setting
+from dcmp_hil.controllers import ControllerContext
 from dcmp_hil.controllers.pd_compensated import PdCompensated, PdSettings
 from dcmp_hil.model import Model
 from dcmp_hil.values import Estimate, Reference
 
-_SETTING = Setting(Model(), 1e-3)
+_SETTING = ControllerContext(Model(), 1e-3)
 _small = st.floats(-10.0, 10.0)
 
 

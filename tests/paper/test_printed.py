@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.controllers import Setting as ControllerSetting
+from dcmp_hil.controllers import ControllerContext
 from dcmp_hil.controllers.pd_compensated import PdCompensated
 from dcmp_hil.model import Model
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.paper.printed import PrintedEq8, PrintedEq9, PrintedEq10
 from dcmp_hil.paper.reproduction import VARIANTS
 from dcmp_hil.values import Estimate, Reference, Sample
 
 MODEL = Model()
-SETTING = Setting(MODEL, 1e-4, None)
+SETTING = ObserverContext(MODEL, 1e-4, None)
 RATE, SWING, VOLTAGE = 0.7, 3.0, 0.8  # rad/s, rad/s2, V
 PHASES = [0.0, 0.5, 1.3, 2.2, 3.9, 5.1]
 
@@ -69,7 +69,7 @@ def test_printed_eq8_differs_where_v2_is_not_zero_only() -> None:
 
 
 def test_printed_eq10_divides_once_more() -> None:
-    setting = ControllerSetting(MODEL, 1e-4)
+    setting = ControllerContext(MODEL, 1e-4)
     reference, estimate = Reference(0.1, 0.2, 0.3), Estimate(-0.4, 0.5, 6.0)
     meant = PdCompensated(setting, kp=3000.0, kd=100.0).update(reference, estimate)
     printed = PrintedEq10(setting, kp=3000.0, kd=100.0).update(reference, estimate)

@@ -112,7 +112,7 @@ def test_one_bit_of_difference_is_one(tmp_path: Path) -> None:
 class Mine:
     """A user's own controller."""
 
-    def __init__(self, setting: controllers.Setting, gain: float = 100.0) -> None:
+    def __init__(self, setting: controllers.ControllerContext, gain: float = 100.0) -> None:
         self._gain = gain * 5.4 / setting.model.ku
 
     def update(self, reference: Reference, state: Estimate) -> float:

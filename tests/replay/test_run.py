@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.observers import Setting
+from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.replay import ReplayResult, ReplaySettings, replay
 from dcmp_hil.values import Estimate, Sample
@@ -123,7 +123,7 @@ def test_settings_reach_the_observer() -> None:
     changes = {"f0": 0.7, "L1": 6.0, "L2": 8.0, "M": 90.0, "mu0": 55.0, "ku": 4.0, "counts_per_rev": 4096.0}
     result = replay(truth.recording(), ReplaySettings(**changes))  # type: ignore[arg-type]
     observer = SuperTwisting(
-        Setting(MODEL._replace(f0=0.7, ku=4.0), result.figures.period_s, 4096.0),
+        ObserverContext(MODEL._replace(f0=0.7, ku=4.0), result.figures.period_s, 4096.0),
         L1=6.0,
         L2=8.0,
         M=90.0,
@@ -145,7 +145,7 @@ def test_paper_observer_runs_when_chosen() -> None:
 class Still:
     """An observer of one's own, that believes in no motion."""
 
-    def __init__(self, setting: Setting) -> None:
+    def __init__(self, setting: ObserverContext) -> None:
         self.setting = setting
 
     def update(self, sample: Sample) -> Estimate:
