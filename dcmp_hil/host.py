@@ -4,15 +4,41 @@ from __future__ import annotations
 
 import os
 import platform
-import resource
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from dcmp_hil.errors import ConfigError
 
 _CAN_NICE, _CAN_LOCK = 23, 14  # bits of CAP_SYS_NICE and CAP_IPC_LOCK in linux/capability.h
 _FLAVOURS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the longer names first
 _GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
 _MODEL = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
 _THROTTLE = "/proc/sys/kernel/sched_rt_runtime_us"
+_LINUX_MODULES = ("fcntl", "resource", "termios")
+
+
+def require_linux(what: str) -> None:
+    """Refuse what needs the operating system's own interfaces where they are absent.
+
+    Parameters
+    ----------
+    what
+        The subject of the sentence, such as ``"a paced run"``.
+
+    Raises
+    ------
+    ConfigError
+        Naming what works everywhere.
+    """
+    for name in _LINUX_MODULES:
+        try:
+            import_module(name)
+        except ImportError:
+            raise ConfigError(
+                f"{what} works on Linux only: this system's Python has no module {name}. Everywhere: "
+                "`dcmp-hil run --fast`, replay, export, paper, check and rigs."
+            ) from None
 
 
 def host_facts() -> dict[str, Any]:
@@ -30,7 +56,7 @@ def host_facts() -> dict[str, Any]:
         "system": platform.system(),
         "kernel": platform.release(),
         "preemption": preemption(platform.version(), read_fact(_MODEL)),
-        "cpus": len(os.sched_getaffinity(0)),
+        "cpus": _cpus(),
         "governor": read_fact(_GOVERNOR),
         "rt_runtime_us": None if throttle is None else int(throttle),
         "privileges": privileges(),
@@ -44,7 +70,11 @@ def in_words(facts: dict[str, Any]) -> str:
 
 
 def privileges() -> dict[str, Any]:
-    """Return what this process may: the limits of `ulimit`, and the capabilities beyond them."""
+    """Return the limits of `ulimit` and the capabilities beyond them; empty outside POSIX."""
+    try:
+        import resource
+    except ImportError:  # no POSIX system
+        return {}
     held = capabilities(read_fact("/proc/self/status") or "")
     locked, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     return {
@@ -54,6 +84,12 @@ def privileges() -> dict[str, Any]:
         "rtprio_limit": resource.getrlimit(resource.RLIMIT_RTPRIO)[0],
         "memlock_limit": "unlimited" if locked == resource.RLIM_INFINITY else locked,
     }
+
+
+def _cpus() -> int | None:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count()
 
 
 def capabilities(status: str) -> int:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
-import resource
 import signal
 import sys
 import threading
@@ -225,6 +224,8 @@ def _watch(undo: ExitStack, step_down: Callable[[int, FrameType | None], None]) 
     """Ask to be told when a real-time thread of ours does not sleep; only the main thread can be."""
     if threading.current_thread() is not threading.main_thread():
         return
+    import resource  # POSIX only, as all of this; the module is imported by runs in virtual time, too
+
     soft, hard = resource.getrlimit(resource.RLIMIT_RTTIME)
     if hard != resource.RLIM_INFINITY and hard <= _LONGEST:
         return

@@ -12,7 +12,7 @@ from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, OpenError, TripError
-from dcmp_hil.host import host_facts, in_words
+from dcmp_hil.host import host_facts, in_words, require_linux
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.realtime import Grant, RealTime
 from dcmp_hil.telemetry.apart import Apart
@@ -128,6 +128,8 @@ class Session:
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
+        if not fast:
+            require_linux("a run in real time")
         self.rig = rig
         self._length = length or math.inf
         self._wall = MonotonicClock()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
 import threading
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ParamSpec
 
 import typer
 
@@ -24,7 +25,13 @@ from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
 from dcmp_hil.cli.view import view
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.host import require_linux
 from dcmp_hil.telemetry.outlet import THREAD
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+P = ParamSpec("P")
 
 app = typer.Typer(
     help="Run a DC-motor pendulum: observer, controller, amplifier, live picture.",
@@ -33,12 +40,41 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, check, paper, replay, export, device, rigs, ports, monitor, view):
-    app.command()(command)
-app.command("set")(set_keys)
-app.command()(stop)
-app.command()(status)
-app.command()(panel)
+
+
+def _on_linux(name: str, command: Callable[P, None]) -> Callable[P, None]:
+    """Refuse a command of devices or of running processes where Linux's interfaces are absent."""
+
+    @functools.wraps(command)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> None:
+        require_linux(f"`dcmp-hil {name}`")
+        command(*args, **kwargs)
+
+    return checked
+
+
+EVERYWHERE: dict[str, Callable[..., None]] = {
+    "run": run,
+    "check": check,
+    "paper": paper,
+    "replay": replay,
+    "export": export,
+    "rigs": rigs,
+    "view": view,
+}
+ON_LINUX: dict[str, Callable[..., None]] = {
+    "device": device,
+    "ports": ports,
+    "monitor": monitor,
+    "set": set_keys,
+    "stop": stop,
+    "status": status,
+    "panel": panel,
+}
+for name, command in EVERYWHERE.items():
+    app.command(name)(command)
+for name, command in ON_LINUX.items():
+    app.command(name)(_on_linux(name, command))
 
 
 def _version(value: bool) -> None:

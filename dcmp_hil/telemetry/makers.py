@@ -28,8 +28,12 @@ def make_all(sinks: Sequence[Sink | SinkMaker]) -> tuple[list[Sink], list[str]]:
     for one in sinks:
         if isinstance(one, Sink):
             made.append(one)
-        else:
+            continue
+        try:
             made.append(one())
+        except ImportError as error:  # a viewer's library that this system lacks ends no run
+            warnings.append(f"A sink could not be made, the run goes on without it: {error}")
+        else:
             warnings += getattr(made[-1], "warnings", ())
     return made, warnings
 
