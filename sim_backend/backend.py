@@ -9,7 +9,7 @@ from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import make_encoder
-from sim_backend.pace import Pace
+from sim_backend.pacer import Pacer
 from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from sim_backend.fault_kinds.injection import Injection
+    from sim_backend.faults.injector import Injector
 
 
 class SimBackend:
@@ -37,7 +37,7 @@ class SimBackend:
     simulated = True
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        self._pace = Pace(clock, rig.period)
+        self._pace = Pacer(clock, rig.period)
         self._period = rig.period
         self._skips = rig.timing.overrun == "skip"
         self._tick = 0
@@ -51,7 +51,7 @@ class SimBackend:
             delay_samples=rig.loop.delay_samples,
         )
         self._truth = Truth(rig.sim.position_rad, 0.0, math.nan)
-        self._faults: Injection | None = getattr(rig.backend, "injection", None)
+        self._faults: Injector | None = getattr(rig.backend, "injection", None)
         if self._faults:
             self._plant, self._encoder = self._faults.attach_plain(self._plant, self._encoder, clock)
 
@@ -103,7 +103,7 @@ class SimBackend:
     def write(self, voltage: float) -> None:
         """Hand a voltage to the amplifier, V."""
         if self._faults:
-            self._faults.witness.wrote(voltage)
+            self._faults.listener.wrote(voltage)
         self._amplifier.command(voltage)
 
     def truth(self) -> Truth:

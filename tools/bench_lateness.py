@@ -24,7 +24,7 @@ from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.session import Session
 from dcmp_hil.wire import cobs
 from sim_backend.backend import SimBackend
-from sim_backend.board import Board
+from sim_backend.board.board import Board
 from tools.bench_telemetry import everything
 
 if TYPE_CHECKING:

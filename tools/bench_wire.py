@@ -19,7 +19,7 @@ from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import Drive, Parameter, ParameterGet, ParameterValue, SampleReport
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

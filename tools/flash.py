@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
-from sim_backend.board_config import board_config
+from sim_backend.board.config import board_config
 from tools.artefact import BOARDS
 from tools.record import ADDRESS, RecordLink, image, record
 

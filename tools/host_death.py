@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil import load_rig
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.values import Fault
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 from tools.cable import Cable
 from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
 

@@ -17,7 +17,7 @@ from dcmp_hil import load_rig
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
 
 if TYPE_CHECKING:

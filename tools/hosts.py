@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from sim_backend.device import VirtualDevice
+    from sim_backend.board.virtual_device import VirtualDevice
 
 BOUND_S = 60.0
 TRIES, MOST_DOUBT_US = 10, 500

@@ -1,7 +1,7 @@
 """`python -m tools.qemu_device`: the qemu_f405 board in QEMU, in the place of the native board's program.
 
 Takes the native board's arguments and one more, `--elf`: the host is behind a pseudo terminal whose path is
-the first line printed, the plant at the plant port. `sim_backend.device.VirtualDevice(program=...)` runs it.
+the first line printed, the plant at the plant port. `VirtualDevice(program=...)` runs it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import tty
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sim_backend.plant_port import OUTPUT
+from sim_backend.board.plant_port import OUTPUT
 from tools.record import ADDRESS, RecordLink, image, record
 
 if TYPE_CHECKING:

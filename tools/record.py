@@ -43,7 +43,7 @@ def record(
     Parameters
     ----------
     config
-        Fields of `struct dcmp_config`, as `sim_backend.board_config` gives them.
+        Fields of `struct dcmp_config`, as `sim_backend.board.config` gives them.
     baud
         Bit/s, of a serial link.
     zero_code

@@ -2,7 +2,7 @@
 
 KINDS = {
     "sim": "sim_backend.backend:SimBackend",
-    "sim-board": "sim_backend.sim_board:SimBoardBackend",
+    "sim-board": "sim_backend.board.backend:SimBoardBackend",
     "serial": "dcmp_hil.backends.serial_link:open_serial",
     "can": "dcmp_hil.backends.can_link:open_can",
 }

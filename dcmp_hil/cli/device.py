@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.endings import StopRequest
 
-_DEVICE = "sim_backend.device:VirtualDevice"
+_DEVICE = "sim_backend.board.virtual_device:VirtualDevice"
 _STATUS_S = 0.1  # between two looks at Ctrl-C, and two status lines
 _RIG = "bench-1khz"
 _RUN_WITH = {

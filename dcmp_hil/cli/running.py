@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
-_FAULTS, _WIRED = "sim_backend.faults:with_faults", "sim_backend.faults:needs_wire"
+_FAULTS, _WIRED = "sim_backend.faults.plan:with_faults", "sim_backend.faults.plan:needs_wire"
 _BOARD = "backend.kind=sim-board"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 

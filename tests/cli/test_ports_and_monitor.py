@@ -20,7 +20,7 @@ from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import SampleReport, State
-from sim_backend.board import Board
+from sim_backend.board.board import Board
 from tests.backends.line import line
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import PatientClock, on_bench

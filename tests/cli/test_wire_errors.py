@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 import serial
 
-from sim_backend.board import Board
+from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump
 from tests.helpers import bench
 

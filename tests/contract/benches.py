@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.backends import open_backend
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
-from sim_backend.board import Board
-from sim_backend.sim_board import SimBoardBackend
+from sim_backend.board.backend import SimBoardBackend
+from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump, VirtualBus
 from tests.contract.stranger_board import StrangerBoard
 from tests.helpers import bench

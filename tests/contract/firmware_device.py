@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from sim_backend.board import Board
+from sim_backend.board.board import Board
 from tests.helpers import bench
 
 
 class _Counter:
-    """Pins that show what a test says, and move nothing."""
+    """PlantIO that show what a test says, and move nothing."""
 
     counts = 0
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 import can
 
 if TYPE_CHECKING:
-    from sim_backend.board import Board
+    from sim_backend.board.board import Board
 
 _PATIENT, _BRISK = (
     1.0,

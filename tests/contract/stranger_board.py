@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sim_backend.board_config import SIMULATED, board_config
-from sim_backend.pins import Pins
+from sim_backend.board.config import SIMULATED, board_config
+from sim_backend.board.plant_io import PlantIO
 from tests.contract.stranger import Stranger
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _BUILT = (
 
 
 class StrangerBoard(Stranger):
-    """What sim_backend.board.Board is to the firmware."""
+    """What sim_backend.board.board.Board is to the firmware."""
 
     def __init__(
         self, rig: Rig, *, carrier: str, count_offset: int = 0, start_us: int = 0, first_tick: int = 0
@@ -31,7 +31,7 @@ class StrangerBoard(Stranger):
             first_tick=first_tick,
             **{name: built[name] for name in _BUILT},
         )
-        self.pins = Pins(rig, count_offset)
+        self.pins = PlantIO(rig, count_offset)
 
     def tick(self) -> None:  # type: ignore[override]
         """Let a period pass."""

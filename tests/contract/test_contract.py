@@ -17,7 +17,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire import protocol_hash
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Hello, State, Stop
-from sim_backend.sim_board import SimBoardBackend
+from sim_backend.board.backend import SimBoardBackend
 from tests.contract.benches import ALL, IN_PROCESS, PUMPED, WIRED, on_bench
 from tests.contract.hooks import Doubler, Dropper, Flipper, Swapper, on_way_down
 

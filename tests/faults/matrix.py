@@ -17,8 +17,8 @@ from dcmp_hil.errors import TripError
 from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from dcmp_hil.wire.messages import State
-from sim_backend.board import Board
-from sim_backend.faults import Fault, FaultPlan
+from sim_backend.board.board import Board
+from sim_backend.faults.plan import Fault, FaultPlan
 from tests.faults.oracle import Oracle
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import random
 
 from dcmp_hil import load_rig
 from dcmp_hil.session import Session
-from sim_backend.board import Board
-from sim_backend.faults import FaultPlan
+from sim_backend.board.board import Board
+from sim_backend.faults.plan import FaultPlan
 from tests.faults.matrix import Verdict, outcome_of
 from tests.faults.oracle import Oracle
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import CorruptFrameError, unpack
 from dcmp_hil.wire.messages import Drive, SampleReport, State
-from sim_backend.fault_kinds.injection import Witness
+from sim_backend.faults.injector import FaultListener
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.messages import Message
-    from sim_backend.board import Board
+    from sim_backend.board.board import Board
 
 OLDEST = 3  # ticks at 1 kHz: a command computed from an older sample may not be accepted
 _SEQ, _MOST_SEEN = 0x2000, 1000
 
 
-class Oracle(Witness):
+class Oracle(FaultListener):
     """Checks a board on the carrier `cobs` in every tick; what it finds is in `violations`.
 
     It believes nothing that the firmware says of itself but state, voltage and ENABLE; which commands were

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sim_backend.fault_kinds.host import InjectedBaseError, InjectedError
+from sim_backend.faults.host import InjectedBaseError, InjectedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,9 +10,9 @@ import pytest
 from dcmp_hil import errors
 from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
-from sim_backend.board import Board
-from sim_backend.fault_kinds.effect import Choice
-from sim_backend.faults import KINDS, Fault, FaultPlan
+from sim_backend.board.board import Board
+from sim_backend.faults.base import Choice
+from sim_backend.faults.plan import KINDS, Fault, FaultPlan
 from tests.faults.matrix import outcome_of, same_session
 from tests.faults.oracle import Oracle
 from tests.helpers import bench

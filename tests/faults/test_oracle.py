@@ -7,7 +7,7 @@ import pytest
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import Drive, State
-from sim_backend.board import Board
+from sim_backend.board.board import Board
 from tests.faults.matrix import judge
 from tests.faults.oracle import Oracle
 from tests.faults.rows import Row

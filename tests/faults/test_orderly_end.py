@@ -9,8 +9,8 @@ from dcmp_hil import load_rig
 from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.wire.messages import State
-from sim_backend.board import Board
-from sim_backend.faults import Fault, FaultPlan
+from sim_backend.board.board import Board
+from sim_backend.faults.plan import Fault, FaultPlan
 from tests.faults.oracle import Oracle
 
 pytestmark = pytest.mark.usefixtures("untraced")

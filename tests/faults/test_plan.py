@@ -12,9 +12,9 @@ import pytest
 from dcmp_hil import run
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.session import Session
-from sim_backend.fault_kinds.effect import Number
-from sim_backend.fault_kinds.text import WrongFaultError
-from sim_backend.faults import KINDS, Fault, FaultPlan, with_faults
+from sim_backend.faults.base import Number
+from sim_backend.faults.parser import WrongFaultError
+from sim_backend.faults.plan import KINDS, Fault, FaultPlan, with_faults
 from tests.faults.matrix import judge, outcome_of
 from tests.faults.rows import ROWS, SILENT, Row
 from tests.helpers import bench
@@ -22,7 +22,7 @@ from tests.helpers import bench
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.session import Result
-    from sim_backend.fault_kinds.injection import Moment
+    from sim_backend.faults.injector import FaultContext
 
 BOARD = "backend.kind=sim-board"
 QUICK = "supervisor.start=immediate"
@@ -122,7 +122,7 @@ def test_a_rig_with_faults_is_written_like_the_rig_without() -> None:
 
 
 def test_times_are_ticks_or_seconds_or_a_predicate() -> None:
-    def at_fifty(moment: Moment) -> bool:
+    def at_fifty(moment: FaultContext) -> bool:
         return moment.tick >= 50 and moment.truth.position < 1.0
 
     for at in (50, 0.05, at_fifty):

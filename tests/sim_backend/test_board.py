@@ -27,8 +27,8 @@ from dcmp_hil.wire.messages import (
 )
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from sim_backend.backend import SimBackend
-from sim_backend.board import Board
-from sim_backend.board_config import board_config
+from sim_backend.board.board import Board
+from sim_backend.board.config import board_config
 from tests.helpers import bench
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from dcmp_hil.wire.messages import (
     Stop,
 )
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 from tests.contract.benches import PatientClock
 from tests.helpers import bench
 
@@ -311,7 +311,7 @@ def test_process_is_gone_with_the_device() -> None:
 
 
 def test_process_that_hangs_is_ended_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim_backend.device._END_S", 0.1)
+    monkeypatch.setattr("sim_backend.board.virtual_device._END_S", 0.1)
     with VirtualDevice(bench(), clock=SimulatedClock()) as device:
         pid = device.pid
         os.kill(pid, signal.SIGSTOP)
@@ -323,7 +323,7 @@ def test_process_that_ends_by_itself_is_an_error(monkeypatch: pytest.MonkeyPatch
         os.kill(device.pid, signal.SIGKILL)
         with pytest.raises(LinkError, match="has ended"):
             device.run_ticks(10)
-    monkeypatch.setattr("sim_backend.device._ANSWER_S", 0.05)
+    monkeypatch.setattr("sim_backend.board.virtual_device._ANSWER_S", 0.05)
     with VirtualDevice(bench(), clock=SimulatedClock()) as device:
         os.kill(device.pid, signal.SIGSTOP)
         with pytest.raises(LinkError, match="does not answer"):
@@ -377,7 +377,7 @@ def test_file_is_never_taken_for_a_symlink(tmp_path: Path) -> None:
 
 def test_program_that_does_not_start_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "program"
-    monkeypatch.setattr("sim_backend.firmware.program", lambda: program)
+    monkeypatch.setattr("sim_backend.board.build.program", lambda: program)
     program.write_text("#!/bin/sh\necho no terminal left >&2; exit 3\n")
     with pytest.raises(OpenError, match="XDG_CACHE_HOME"):
         VirtualDevice(bench()).__enter__()

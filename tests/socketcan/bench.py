@@ -11,7 +11,7 @@ from dcmp_hil.backends.can_link import open_can
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
 from dcmp_hil.wire.messages import State
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 from tests.socketcan.hosts import Host
 from tests.socketcan.interfaces import slcan_interface, vcan_interface
 from tools.cable import Cable

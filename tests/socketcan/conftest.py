@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pytest
 
 from dcmp_hil.errors import OpenError
-from sim_backend.firmware import program
+from sim_backend.board.build import program
 from tools.vcan_machine.debian import UnavailableError
 from tools.vcan_machine.machine import missing, run
 

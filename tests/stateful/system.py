@@ -15,9 +15,9 @@ from dcmp_hil.errors import DcmpError
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop
-from sim_backend.board import Board
-from sim_backend.faults import Fault, FaultPlan
-from sim_backend.pace import Pace
+from sim_backend.board.board import Board
+from sim_backend.faults.plan import Fault, FaultPlan
+from sim_backend.pacer import Pacer
 from tests.helpers import bench
 from tests.stateful.host import Host
 from tests.stateful.judge import Judge
@@ -25,9 +25,9 @@ from tests.stateful.judge import Judge
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.wire.messages import Message
-    from sim_backend.fault_kinds.effect import Effect
-    from sim_backend.fault_kinds.injection import Injection
-    from sim_backend.fault_kinds.link import FaultyLink
+    from sim_backend.faults.base import FaultModel
+    from sim_backend.faults.faulty_link import FaultyLink
+    from sim_backend.faults.injector import Injector
 
 FAULTS = {
     "wire.drop": {"p": 1.0, "way": "up"},
@@ -91,9 +91,9 @@ class System:
         self.judge = Judge(first_tick=start.tick, ticked=self._ticked)
         faults = [Fault(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
         self.rig = FaultPlan(faults, seed).on(rig_at(start.encoder), self.judge, self.board)
-        self._injection: Injection = self.rig.backend.injection  # type: ignore[union-attr]
+        self._injection: Injector = self.rig.backend.injection  # type: ignore[union-attr]
         effects = (timer.effect for timer in self._injection.timers)
-        self._effects: dict[str, Effect] = dict(zip(FAULTS, effects, strict=True))
+        self._effects: dict[str, FaultModel] = dict(zip(FAULTS, effects, strict=True))
         ticking = zip(FAULTS, tuple(self._injection.timers), strict=True)
         self._injection.timers[:] = [timer for kind, timer in ticking if kind in _TICKING]  # for speed
         self._ends: dict[str, int] = {}  # ticks of the board
@@ -231,7 +231,7 @@ class System:
             self.judge.note(f"the arm is at {truth.position} rad, the host says {sample.position}")
 
     def _plug_in(self) -> FaultyLink:
-        pace = Pace(self.clock, self.rig.period)
+        pace = Pacer(self.clock, self.rig.period)
         self._link = self._injection.attach(self.board, "cobs", pace)
         return self._link
 

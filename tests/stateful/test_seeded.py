@@ -14,7 +14,7 @@ from dcmp_hil.limits import Limits
 from dcmp_hil.monitors import Finite
 from dcmp_hil.supervisor import TABLE, Cue, Phase, Supervisor
 from dcmp_hil.values import Fault
-from sim_backend import firmware, hostlib
+from sim_backend.board import build, hostlib
 from tests.stateful.machine import Machine
 from tests.stateful.test_machine import budget
 
@@ -104,7 +104,7 @@ def test_machine_finds_an_error_in_the_host(error: str, monkeypatch: Patch) -> N
 def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str], None]]:
     """Give a way to change the firmware's sources, for this test."""
     root = tmp_path / "firmware"
-    shutil.copytree(firmware.sources(), root)
+    shutil.copytree(build.sources(), root)
 
     def sow(file: str, old: str, new: str) -> None:
         path = root / file
@@ -113,8 +113,8 @@ def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str
         path.write_text(text.replace(old, new))
         hostlib.load.cache_clear()
 
-    monkeypatch.setattr("sim_backend.firmware._PLACES", (root,))
-    monkeypatch.setattr("sim_backend.firmware._FLAGS", ("-std=c11", "-O1"))
+    monkeypatch.setattr("sim_backend.board.build._PLACES", (root,))
+    monkeypatch.setattr("sim_backend.board.build._FLAGS", ("-std=c11", "-O1"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     yield sow
     hostlib.load.cache_clear()

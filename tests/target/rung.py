@@ -10,7 +10,7 @@ from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import ParameterGet, ParameterValue, SampleReport, State
-from sim_backend.sim_board import SimBoardBackend
+from sim_backend.board.backend import SimBoardBackend
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
 

@@ -8,8 +8,8 @@ import pytest
 
 from dcmp_hil.backends import open_backend
 from dcmp_hil.clock import SimulatedClock
-from sim_backend.board import Board
-from sim_backend.sim_board import SimBoardBackend
+from sim_backend.board.backend import SimBoardBackend
+from sim_backend.board.board import Board
 from tests.contract.benches import PatientClock, pumped
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard

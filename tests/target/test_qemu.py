@@ -12,7 +12,7 @@ import pytest
 from dcmp_hil.backends import open_backend
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
-from sim_backend.device import VirtualDevice
+from sim_backend.board.virtual_device import VirtualDevice
 from tests.contract.benches import PatientClock
 from tests.helpers import bench
 from tests.target.build import needed

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sim_backend.board_config import board_config
-from sim_backend.pins import Pins
+from sim_backend.board.config import board_config
+from sim_backend.board.plant_io import PlantIO
 from tests.target.machine.system import System
 from tools.record import RecordLink, image, record
 
@@ -40,7 +40,7 @@ class TargetBoard:
     def __init__(self, elf: Path, rig: Rig, carrier: str = "cobs", **options: object) -> None:
         kept = record(board_config(rig, _BOARD), link=RecordLink[carrier])
         self.system = System(elf, image(kept), **options)  # type: ignore[arg-type]
-        self.pins = Pins(rig)
+        self.pins = PlantIO(rig)
         self.carrier = carrier
         self.period_us = 1e6 * rig.period
         self.ticks = 0

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from dcmp_hil.errors import BackendError, ConfigError, LinkError, OpenError
-from sim_backend import firmware
-from sim_backend.board_config import NATIVE, board_config
-from sim_backend.pace import Pace
-from sim_backend.pins import Pins
-from sim_backend.plant_port import OUTPUT, PLANT_TIME, TICK, Output
+from sim_backend.board import build
+from sim_backend.board.config import NATIVE, board_config
+from sim_backend.board.plant_io import PlantIO
+from sim_backend.board.plant_port import OUTPUT, PLANT_TIME, TICK, Output
+from sim_backend.pacer import Pacer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,8 +76,8 @@ class VirtualDevice:
         self._link, self._symlink, self._patience_ms = link, symlink, patience_ms
         self._clock = clock
         self._program = program
-        self._pace = None if clock is None else Pace(clock, rig.period)
-        self.pins = Pins(rig, count_offset)
+        self._pace = None if clock is None else Pacer(clock, rig.period)
+        self.pins = PlantIO(rig, count_offset)
         self.now_us = start_us & _WORD
         self._ticked = (self.now_us, 0, 0)  # the same; when its tick was sent and answered, ns
         self.tick_count = 0
@@ -102,7 +102,7 @@ class VirtualDevice:
         ConfigError
             If the symlink cannot be made.
         """
-        program = self._program or [str(firmware.program())]
+        program = self._program or [str(build.program())]
         ours, theirs = socket.socketpair()
         fields = [f"{name}={value}" for name, value in self._config.items()]
         arguments = ["--link", self._link, "--plant-fd", str(theirs.fileno()), *fields]

@@ -6,9 +6,9 @@ import ctypes
 import struct
 from typing import TYPE_CHECKING
 
-from sim_backend import hostlib
-from sim_backend.board_config import LAYOUT, SIMULATED, board_config
-from sim_backend.pins import Pins
+from sim_backend.board import hostlib
+from sim_backend.board.config import LAYOUT, SIMULATED, board_config
+from sim_backend.board.plant_io import PlantIO
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -59,7 +59,7 @@ class Board:
         self._at = ctypes.c_void_p(ctypes.addressof(self._memory))
         self._bytes = memoryview(self._memory).cast("B")
         self._view = self._bytes[: 4 * (hostlib.OUT_OFFSET + 1)].cast("i")
-        self.pins = Pins(rig, count_offset)
+        self.pins = PlantIO(rig, count_offset)
         self._period_us = self._config["period_us"]
         self.now_us = start_us & _WORD
         self.tick_count = 0

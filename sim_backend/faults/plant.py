@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import UNKNOWN_TRUTH
 from sim_backend.encoder import Encoder
-from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+from sim_backend.faults.base import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Truth
     from sim_backend.plant import Plant
 
 
-class PlantEffect(Effect):
+class PlantFault(FaultModel):
     """Between the amplifier's output and the motor, and between the shaft and the counter."""
 
     def voltage(self, volts: float) -> float:
@@ -30,7 +30,7 @@ class Acting(Protocol):
     """Whoever knows which faults are on."""
 
     @property
-    def acting_on_plant(self) -> list[PlantEffect]:
+    def acting_on_plant(self) -> list[PlantFault]:
         """Those that are on."""
         ...
 
@@ -62,7 +62,7 @@ class FaultyPlant:
             self._acting.tick()
         seen, ku = voltage, 0.0
         for effect in self._acting.acting_on_plant:
-            seen, ku = effect.voltage(seen), effect.setup.believed_ku
+            seen, ku = effect.voltage(seen), effect.facts.believed_ku
         truth = self._plant.advance(seen)
         self.truth = truth._replace(disturbance=truth.disturbance + ku * (seen - voltage))
         return self.truth
@@ -86,7 +86,7 @@ class FaultyEncoder(Encoder):
         """Return the measured position, rad."""
         measured = self._encoder.read(position)
         for effect in self._acting.acting_on_plant:
-            measured = effect.setup.count_rad * effect.count(measured / effect.setup.count_rad)
+            measured = effect.facts.count_rad * effect.count(measured / effect.facts.count_rad)
         return measured
 
     def count(self, position: float) -> int:
@@ -97,7 +97,7 @@ class FaultyEncoder(Encoder):
         return round(count)
 
 
-class Stuck(PlantEffect):
+class Stuck(PlantFault):
     """Shows the last count for ever."""
 
     _shown: float | None = None
@@ -113,7 +113,7 @@ class Stuck(PlantEffect):
         return self._shown
 
 
-class Jump(PlantEffect):
+class Jump(PlantFault):
     """Adds counts, `times` times, `every` periods apart, and they stay."""
 
     _age = -1
@@ -125,7 +125,7 @@ class Jump(PlantEffect):
         return counts + jumps * round(self.number("counts"))
 
 
-class Glitch(PlantEffect):
+class Glitch(PlantFault):
     """Shows a wrong count in one period in so many."""
 
     _age = -1
@@ -138,15 +138,15 @@ class Glitch(PlantEffect):
         return counts + round(self.number("counts")) if wrong else counts
 
 
-class Noise(PlantEffect):
+class Noise(PlantFault):
     """Adds Gaussian noise, in whole counts."""
 
     def count(self, counts: float) -> float:
         """Add some."""
-        return counts + round(self.luck.gauss(0.0, self.number("counts")))
+        return counts + round(self.rng.gauss(0.0, self.number("counts")))
 
 
-class Missed(PlantEffect):
+class Missed(PlantFault):
     """Loses counts for ever, each with probability p."""
 
     _last: float | None = None
@@ -156,12 +156,12 @@ class Missed(PlantEffect):
         """Lose some of the new ones."""
         moved = 0 if self._last is None else round(counts - self._last)
         self._last = counts
-        lost = sum(self.luck.random() < self.number("p") for _ in range(min(abs(moved), 1000)))
+        lost = sum(self.rng.random() < self.number("p") for _ in range(min(abs(moved), 1000)))
         self._lost += lost if moved > 0 else -lost
         return counts - self._lost
 
 
-class EncoderSign(PlantEffect):
+class EncoderSign(PlantFault):
     """Counts the other way from where it is."""
 
     _from: float | None = None
@@ -173,7 +173,7 @@ class EncoderSign(PlantEffect):
         return 2.0 * self._from - counts
 
 
-class Scale(PlantEffect):
+class Scale(PlantFault):
     """Has so many times as many counts a revolution as anybody knows."""
 
     def count(self, counts: float) -> float:
@@ -181,7 +181,7 @@ class Scale(PlantEffect):
         return math.floor(counts * self.number("factor") + 0.5)
 
 
-class Gain(PlantEffect):
+class Gain(PlantFault):
     """The motor sees so many times the voltage: 0 without power, -1 with its wires swapped."""
 
     def voltage(self, volts: float) -> float:
@@ -189,7 +189,7 @@ class Gain(PlantEffect):
         return volts * self.number("factor")
 
 
-class Power(PlantEffect):
+class Power(PlantFault):
     """The motor has no power."""
 
     def voltage(self, volts: float) -> float:  # noqa: ARG002
@@ -197,7 +197,7 @@ class Power(PlantEffect):
         return 0.0
 
 
-class MotorSign(PlantEffect):
+class MotorSign(PlantFault):
     """The motor's wires are swapped."""
 
     def voltage(self, volts: float) -> float:
@@ -205,7 +205,7 @@ class MotorSign(PlantEffect):
         return -volts
 
 
-class Saturation(PlantEffect):
+class Saturation(PlantFault):
     """The power stage gives no more than so much, and nobody is told."""
 
     def voltage(self, volts: float) -> float:
@@ -214,7 +214,7 @@ class Saturation(PlantEffect):
         return max(-most, min(most, volts))
 
 
-class Offset(PlantEffect):
+class Offset(PlantFault):
     """The power stage adds a voltage, while it is switched on or not."""
 
     def voltage(self, volts: float) -> float:
@@ -222,7 +222,7 @@ class Offset(PlantEffect):
         return volts + self.number("V")
 
 
-class DeadBand(PlantEffect):
+class DeadBand(PlantFault):
     """The power stage gives nothing below so much."""
 
     def voltage(self, volts: float) -> float:
@@ -230,15 +230,15 @@ class DeadBand(PlantEffect):
         return 0.0 if abs(volts) < self.number("V") else volts
 
 
-class Shove(PlantEffect):
+class Shove(PlantFault):
     """Somebody pushes the arm, one way or the other."""
 
     _volts = 0.0
 
     def begin(self) -> None:
         """Choose a way."""
-        sign = {"up": 1, "down": -1}.get(self.word("way")) or self.luck.choice((-1, 1))
-        self._volts = sign * self.number("rad_s2") / self.setup.ku
+        sign = {"up": 1, "down": -1}.get(self.word("way")) or self.rng.choice((-1, 1))
+        self._volts = sign * self.number("rad_s2") / self.facts.ku
 
     def voltage(self, volts: float) -> float:
         """Add what gives this acceleration."""

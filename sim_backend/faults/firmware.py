@@ -8,22 +8,22 @@ from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.messages import Drive, Hello, Identity, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from sim_backend.fault_kinds.effect import Effect, Kind, Number
-from sim_backend.fault_kinds.wire import WireEffect
+from sim_backend.faults.base import FaultModel, Kind, Number
+from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
-    from sim_backend.board import Board
-    from sim_backend.fault_kinds.wire import Way
+    from sim_backend.board.board import Board
+    from sim_backend.faults.wire import Way
 
 _CARRIERS: dict[str, Any] = {"cobs": cobs, "slcan": slcan}
 _SEQ, _WORD = 0x1FFF, 2.0**32 - 1
 
 
-class Reset(Effect):
+class Reset(FaultModel):
     """Resets the board once."""
 
     _done = False
@@ -35,7 +35,7 @@ class Reset(Effect):
         self._done = True
 
 
-class Stranger(Effect):
+class RogueHost(FaultModel):
     """Says something to the device that its host has not said; `times` times, one a period."""
 
     _said = 0
@@ -44,7 +44,7 @@ class Stranger(Effect):
         """Say it."""
         if board is not None and self._said < self.number("times"):
             self._said += 1
-            board.receive_frame(*pack(self.message(board), self.setup.node))
+            board.receive_frame(*pack(self.message(board), self.facts.node))
 
     def message(self, board: Board) -> Message:  # noqa: ARG002
         """Return what is said."""
@@ -52,11 +52,11 @@ class Stranger(Effect):
 
     def other(self, board: Board) -> int:
         """Return a session that does not own the device."""
-        number = self.luck.randrange(1, 0xFFFF)
+        number = self.rng.randrange(1, 0xFFFF)
         return number + (number >= board.owner > 0)
 
 
-class StrangeHello(Stranger):
+class RogueHello(RogueHost):
     """Another host wants the device."""
 
     def message(self, board: Board) -> Message:
@@ -64,7 +64,7 @@ class StrangeHello(Stranger):
         return Hello(self.other(board), PROTOCOL_HASH)
 
 
-class StrangeDrive(Stranger):
+class RogueDrive(RogueHost):
     """Another host drives the device."""
 
     def message(self, board: Board) -> Message:
@@ -73,7 +73,7 @@ class StrangeDrive(Stranger):
         return Drive(round(1e3 * self.number("V")), seq, True, False, False, self.other(board), 20)
 
 
-class OtherVersion(WireEffect):
+class OtherVersion(WireFault):
     """The device says that it speaks another protocol."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
@@ -83,29 +83,29 @@ class OtherVersion(WireEffect):
         if not isinstance(message, Identity):
             return (piece,)
         other = message._replace(protocol_hash=PROTOCOL_HASH ^ 1, mismatch=True, owned=False)
-        return (self._piece(pack(other, self.setup.node)),)
+        return (self._piece(pack(other, self.facts.node)),)
 
     def _understood(self, frame: Frame) -> Message | None:
         try:
-            return unpack(frame, self.setup.node)
+            return unpack(frame, self.facts.node)
         except CorruptFrameError:
             return None
 
     def _frames(self, piece: bytes) -> list[Frame]:
-        if self.setup.carrier == "can":
+        if self.facts.carrier == "can":
             return [(int.from_bytes(piece[:2], "little"), piece[2:])]
-        frames: list[Frame] = _CARRIERS[self.setup.carrier].Receiver().feed(piece)
+        frames: list[Frame] = _CARRIERS[self.facts.carrier].Receiver().feed(piece)
         return frames
 
     def _piece(self, frame: Frame) -> bytes:
-        if self.setup.carrier == "can":
+        if self.facts.carrier == "can":
             number, data = frame
             return number.to_bytes(2, "little") + data
-        encoded: bytes = _CARRIERS[self.setup.carrier].encode(frame)
+        encoded: bytes = _CARRIERS[self.facts.carrier].encode(frame)
         return encoded
 
 
-class Start(Effect):
+class Start(FaultModel):
     """Boots the device with counters near their wrap; only `at=boot` means anything."""
 
 
@@ -113,14 +113,14 @@ _TIMES = Number("", 1, 1e6, 1)
 FIRMWARE = {
     "firmware.reset": Kind(Reset, "the device is reset", wired=True),
     "firmware.stop": Kind(
-        Stranger,
+        RogueHost,
         "somebody sends STOP",
         {"reason": Number("", 0, 255, 3), "times": _TIMES},
         wired=True,
     ),
-    "firmware.hello": Kind(StrangeHello, "another host wants the device", {"times": _TIMES}, wired=True),
+    "firmware.hello": Kind(RogueHello, "another host wants the device", {"times": _TIMES}, wired=True),
     "firmware.drive": Kind(
-        StrangeDrive,
+        RogueDrive,
         "another host drives the device",
         {"V": Number("V", -32, 32, 5), "times": _TIMES},
         wired=True,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sim_backend.sim_board import BoardLink
+from sim_backend.board.backend import BoardLink
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
-    from sim_backend.board import Board
-    from sim_backend.fault_kinds.injection import Injection
-    from sim_backend.pace import Pace
+    from sim_backend.board.board import Board
+    from sim_backend.faults.injector import Injector
+    from sim_backend.pacer import Pacer
 
 _ENDS = {"cobs": b"\0", "slcan": b"\r"}
 _HIGHEST, _LONGEST = 0x7FF, 8
@@ -27,7 +27,7 @@ class FaultyLink(BoardLink):
         What goes wrong.
     """
 
-    def __init__(self, board: Board, carrier: str, pace: Pace, injection: Injection) -> None:
+    def __init__(self, board: Board, carrier: str, pace: Pacer, injection: Injector) -> None:
         super().__init__(board, carrier, pace)
         self._injection = injection
         self._end = _ENDS.get(carrier)
@@ -57,11 +57,11 @@ class FaultyLink(BoardLink):
         injection = self._injection
         pieces = self._sent()
         for piece in pieces:
-            injection.witness.said(piece)
+            injection.listener.said(piece)
         arriving = [end for piece in pieces for end in injection.passed(piece, "down")]
         for piece in injection.released("down") + arriving:
             self._take(piece)
-        injection.witness.fetched()
+        injection.listener.fetched()
 
     def _sent(self) -> list[bytes]:
         if self._end is None:
@@ -70,7 +70,7 @@ class FaultyLink(BoardLink):
         return [piece + self._end for piece in pieces]
 
     def _deliver(self, piece: bytes) -> None:
-        self._injection.witness.heard(piece)
+        self._injection.listener.heard(piece)
         if self._receiver is not None:
             self._board.receive(piece)
         else:

@@ -1,4 +1,4 @@
-"""What every fault has: parameters with units and bounds, luck of its own, and a time when it is on."""
+"""What every fault has: parameters with units and bounds, its own random numbers, a time when it is on."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Mapping
 
-    from sim_backend.board import Board
+    from sim_backend.board.board import Board
 
 Value = float | str
 
@@ -41,8 +41,8 @@ class Choice:
     words: tuple[str, ...]
 
 
-class Setup(NamedTuple):
-    """What faults may know of the rig that they befall."""
+class RigFacts(NamedTuple):
+    """What faults may know of the rig that they are injected into."""
 
     carrier: str  # `cobs`, `slcan` or `can`; empty where there is no wire
     period: float  # s
@@ -52,14 +52,14 @@ class Setup(NamedTuple):
     node: int  # of the device
 
 
-class Effect:
+class FaultModel:
     """A fault while it is being injected; what it does depends on its level.
 
     Parameters
     ----------
-    setup
+    facts
         Of the rig.
-    luck
+    rng
         Its own, so that one fault more changes nothing about the others.
     params
         All of its kind's, in the kind's units.
@@ -67,8 +67,8 @@ class Effect:
 
     on = False
 
-    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
-        self.setup, self.luck = setup, luck
+    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
+        self.facts, self.rng = facts, rng
         self._params = params
 
     def number(self, name: str) -> float:
@@ -81,7 +81,7 @@ class Effect:
 
     def periods(self, name: str) -> int:
         """Return a parameter in ms as periods, at least one."""
-        return max(1, round(1e-3 * self.number(name) / self.setup.period))
+        return max(1, round(1e-3 * self.number(name) / self.facts.period))
 
     def begin(self) -> None:
         """Start: the first period in which it is on."""
@@ -109,7 +109,7 @@ class Kind:
         Whether it needs a device on a wire, which the plain simulated rig is not.
     """
 
-    make: Callable[..., Effect]
+    make: Callable[..., FaultModel]
     says: str
     params: Mapping[str, Number | Choice] = field(default_factory=dict)
     wired: bool = False

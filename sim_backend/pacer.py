@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 _FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
 
 
-class Pace:
+class Pacer:
     """Sleeps until ticks.
 
     Parameters

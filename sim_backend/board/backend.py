@@ -9,8 +9,8 @@ from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.config.backends import SimBoard
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import cobs, slcan
-from sim_backend.board import Board
-from sim_backend.pace import Pace
+from sim_backend.board.board import Board
+from sim_backend.pacer import Pacer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Sample, Truth
     from dcmp_hil.wire.frame import Frame
-    from sim_backend.fault_kinds.injection import Injection
+    from sim_backend.faults.injector import Injector
 
 _CARRIERS = {"cobs": cobs, "slcan": slcan}
 
@@ -44,8 +44,8 @@ class SimBoardBackend(DeviceBackend):
     def __init__(self, rig: Rig, clock: Clock, board: Board | None = None) -> None:
         if not isinstance(rig.backend, SimBoard):
             raise ConfigError(f'backend.kind: got "{rig.backend.kind}"; expected "sim-board".')
-        carrier, pace = rig.backend.carrier, Pace(clock, rig.period)
-        self._faults: Injection | None = getattr(rig.backend, "injection", None)
+        carrier, pace = rig.backend.carrier, Pacer(clock, rig.period)
+        self._faults: Injector | None = getattr(rig.backend, "injection", None)
         faults, there = self._faults, board or getattr(rig.backend, "injection_board", None)
         arguments = faults.board_arguments() if faults else {}
         self.board: Board = there or Board(rig, carrier=carrier, **arguments)
@@ -67,7 +67,7 @@ class SimBoardBackend(DeviceBackend):
     def write(self, voltage: float) -> None:
         """Send a voltage, V; a number that is not finite is sent as 0 V."""
         if self._faults:
-            self._faults.witness.wrote(voltage)
+            self._faults.listener.wrote(voltage)
         super().write(voltage)
 
     def truth(self) -> Truth:
@@ -90,7 +90,7 @@ class BoardLink:
 
     name = "sim-board"
 
-    def __init__(self, board: Board, carrier: str, pace: Pace) -> None:
+    def __init__(self, board: Board, carrier: str, pace: Pacer) -> None:
         self._board, self._pace = board, pace
         self._ticks = 0
         self._frames: deque[Frame] = deque()

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from dcmp_hil.config.backends import Device, SimBoard
 from dcmp_hil.errors import ConfigError
-from sim_backend.fault_kinds.effect import Number, Setup
-from sim_backend.fault_kinds.firmware import FIRMWARE
-from sim_backend.fault_kinds.host import HOST
-from sim_backend.fault_kinds.injection import Injection, Moment, Witness
-from sim_backend.fault_kinds.plant import PLANT
-from sim_backend.fault_kinds.text import WrongFaultError, check, parse
-from sim_backend.fault_kinds.wire import WIRE
+from sim_backend.faults.base import Number, RigFacts
+from sim_backend.faults.firmware import FIRMWARE
+from sim_backend.faults.host import HOST
+from sim_backend.faults.injector import FaultContext, FaultListener, Injector
+from sim_backend.faults.parser import WrongFaultError, check, parse
+from sim_backend.faults.plant import PLANT
+from sim_backend.faults.wire import WIRE
 
 if TYPE_CHECKING:
     import random
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Estimate
-    from sim_backend.fault_kinds.effect import Effect, Value
+    from sim_backend.faults.base import FaultModel, Value
 
 KINDS = {**WIRE, **FIRMWARE, **PLANT, **HOST}
 """Every kind by name; the part before the dot is its level."""
 
-When = int | float | str | Callable[[Moment], bool]
+When = int | float | str | Callable[[FaultContext], bool]
 _NO_ENCODER = 4096.0  # counts a revolution in which faults of an ideal encoder are told
 
 
@@ -74,9 +74,9 @@ class Fault:
         at, length = said.pop("at", 0), float(said.pop("for", math.inf))
         return cls(kind, at, length, **said)
 
-    def make(self, setup: Setup, luck: random.Random) -> Effect:
+    def make(self, facts: RigFacts, rng: random.Random) -> FaultModel:
         """Make its effect for one run."""
-        return KINDS[self.kind].make(setup, luck, **self.params)
+        return KINDS[self.kind].make(facts, rng, **self.params)
 
 
 class FaultPlan:
@@ -94,14 +94,14 @@ class FaultPlan:
         self.faults: Sequence[Fault] = tuple(faults)
         self.seed = seed
 
-    def on(self, rig: Rig, witness: Witness | None = None, board: Any = None) -> Rig:
+    def on(self, rig: Rig, listener: FaultListener | None = None, board: Any = None) -> Rig:
         """Return the rig with these faults in it, for one run.
 
         Parameters
         ----------
         rig
             With a simulated backend.
-        witness
+        listener
             Sees what happens.
         board
             One that is there already, as it was left by another run.
@@ -114,7 +114,7 @@ class FaultPlan:
         wrong: list[str] = [sentence for fault in self.faults for sentence in _misfits(fault, rig)]
         if wrong:
             raise ConfigError(*wrong)
-        injection = Injection(self.faults, self.seed, _setup(rig), witness or Witness())
+        injection = Injector(self.faults, self.seed, _facts(rig), listener or FaultListener())
         changed: dict[str, Any] = {"backend": _with(rig.backend, injection=injection, injection_board=board)}
         if any(fault.kind.startswith("host.") for fault in self.faults):
             changed |= {
@@ -153,9 +153,9 @@ def with_faults(rig: Rig, texts: Sequence[str], key: str = "--fault") -> Rig:
     raise ConfigError(*(f"{key} {sentence}" for sentence in wrong))
 
 
-def _setup(rig: Rig) -> Setup:
+def _facts(rig: Rig) -> RigFacts:
     backend = rig.backend
-    return Setup(
+    return RigFacts(
         carrier=backend.carrier if isinstance(backend, SimBoard) else "",
         period=rig.period,
         ku=rig.plant.ku,
@@ -198,9 +198,9 @@ def _building(section: Any, wrap: Callable[[Any], Any]) -> Any:
 
 
 class _Observer:
-    """An observer that host faults befall."""
+    """An observer that host faults act on."""
 
-    def __init__(self, observer: Any, injection: Injection) -> None:
+    def __init__(self, observer: Any, injection: Injector) -> None:
         self._observer, self._injection = observer, injection
 
     def update(self, sample: Any) -> Estimate:
@@ -209,9 +209,9 @@ class _Observer:
 
 
 class _Controller:
-    """A controller that host faults befall."""
+    """A controller that host faults act on."""
 
-    def __init__(self, controller: Any, injection: Injection) -> None:
+    def __init__(self, controller: Any, injection: Injector) -> None:
         self._controller, self._injection = controller, injection
 
     def update(self, reference: Any, estimate: Any) -> float:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil.errors import OpenError
-from sim_backend import firmware
+from sim_backend.board import build
 from tests.firmware.core_library import WARNINGS, compiler
 
 pytestmark = pytest.mark.usefixtures("needs_compiler")
@@ -32,18 +32,18 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text + "\n")
-    monkeypatch.setattr("sim_backend.firmware._PLACES", (tmp_path / "nowhere", root))
+    monkeypatch.setattr("sim_backend.board.build._PLACES", (tmp_path / "nowhere", root))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return root
 
 
 @pytest.mark.usefixtures("tree")
 def test_what_was_compiled_is_kept(tmp_path: Path) -> None:
-    program, library = firmware.program(), firmware.library()
+    program, library = build.program(), build.library()
     assert subprocess.run([program], check=False).returncode == 7
     assert program.is_relative_to(tmp_path / "cache" / "dcmp-hil")
     made = [path.stat().st_mtime_ns for path in (program, library)]
-    assert (firmware.program(), firmware.library()) == (program, library)
+    assert (build.program(), build.library()) == (program, library)
     assert [path.stat().st_mtime_ns for path in (program, library)] == made
     assert sorted(path.name for path in (tmp_path / "cache").rglob("*") if path.is_file()) == [
         program.name,
@@ -54,22 +54,22 @@ def test_what_was_compiled_is_kept(tmp_path: Path) -> None:
 def test_changed_source_header_or_compiler_is_compiled_anew(
     tree: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = [firmware.program()]
+    found = [build.program()]
     (tree / "core" / "number.c").write_text('#include "number.h"\nint number(void) { return 8; }\n')
-    found.append(firmware.program())
+    found.append(build.program())
     assert subprocess.run([found[-1]], check=False).returncode == 8
     (tree / "core" / "number.h").write_text("int number(void); /* other words */\n")
-    found.append(firmware.program())
+    found.append(build.program())
     monkeypatch.setenv("CC", f"{compiler()} -DANOTHER")
-    found.append(firmware.program())
+    found.append(build.program())
     assert len(set(found)) == 4
 
 
 def test_two_processes_at_once_get_one_whole_program_each(tree: Path) -> None:
     code = (
-        "import pathlib, sys\nfrom sim_backend import firmware\n"
-        f"firmware._PLACES = (pathlib.Path({str(tree)!r}),)\n"
-        "print(firmware.program())"
+        "import pathlib, sys\nfrom sim_backend.board import build\n"
+        f"build._PLACES = (pathlib.Path({str(tree)!r}),)\n"
+        "print(build.program())"
     )
     running = [
         subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) for _ in range(3)
@@ -84,7 +84,7 @@ def test_two_processes_at_once_get_one_whole_program_each(tree: Path) -> None:
 def complaint() -> str:
     """Return what is said when compiling fails: one line, exit code 3."""
     with pytest.raises(OpenError) as caught:
-        firmware.library()
+        build.library()
     assert "\n" not in str(caught.value)
     assert caught.value.exit_code == 3
     return str(caught.value)
@@ -161,18 +161,18 @@ def test_sources_that_were_not_installed_are_missed(tree: Path) -> None:
 
 
 def test_library_that_cannot_be_loaded_is_named(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sim_backend import hostlib
+    from sim_backend.board import hostlib
 
     broken = tree / "broken.so"
     broken.write_text("no library")
-    monkeypatch.setattr("sim_backend.firmware.library", lambda: broken)
+    monkeypatch.setattr("sim_backend.board.build.library", lambda: broken)
     with pytest.raises(OpenError, match=r"broken\.so: cannot be loaded .* Delete"):
         hostlib.load.__wrapped__()
 
 
 @pytest.mark.parametrize(("board", "flags"), [("hostlib", ["-fPIC"]), ("native", ["-D_XOPEN_SOURCE=700"])])
 def test_boards_compile_without_a_warning(tmp_path: Path, board: str, flags: list[str]) -> None:
-    root = firmware.sources()
+    root = build.sources()
     warnings = [flag for flag in WARNINGS if flag != "-ffreestanding"]
     for source in sorted(root.glob(f"boards/{board}/*.c")):
         command = [compiler(), *warnings, *flags, "-O2", f"-I{root / 'core'}", "-c", str(source)]

@@ -6,27 +6,27 @@ import math
 import random
 from typing import TYPE_CHECKING, NamedTuple
 
-from sim_backend.fault_kinds.firmware import Start
-from sim_backend.fault_kinds.host import HostEffect
-from sim_backend.fault_kinds.link import FaultyLink
-from sim_backend.fault_kinds.plant import FaultyEncoder, FaultyPlant, PlantEffect
-from sim_backend.fault_kinds.wire import WireEffect
+from sim_backend.faults.faulty_link import FaultyLink
+from sim_backend.faults.firmware import Start
+from sim_backend.faults.host import HostFault
+from sim_backend.faults.plant import FaultyEncoder, FaultyPlant, PlantFault
+from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.values import Estimate, Sample, Truth
-    from sim_backend.board import Board
+    from sim_backend.board.board import Board
     from sim_backend.encoder import Encoder
-    from sim_backend.fault_kinds.effect import Effect, Setup
-    from sim_backend.fault_kinds.wire import Way
-    from sim_backend.faults import Fault
-    from sim_backend.pace import Pace
+    from sim_backend.faults.base import FaultModel, RigFacts
+    from sim_backend.faults.plan import Fault
+    from sim_backend.faults.wire import Way
+    from sim_backend.pacer import Pacer
     from sim_backend.plant import Plant
 
 
-class Moment(NamedTuple):
+class FaultContext(NamedTuple):
     """What a predicate may look at."""
 
     tick: int  # periods since the backend was opened
@@ -34,7 +34,7 @@ class Moment(NamedTuple):
     truth: Truth  # of the plant
 
 
-class Witness:
+class FaultListener:
     """Sees everything that passes; by default it does not look."""
 
     def attached(self, board: Board | None) -> None:
@@ -66,14 +66,14 @@ class Timer:
         s.
     """
 
-    def __init__(self, fault: Fault, effect: Effect, period: float) -> None:
+    def __init__(self, fault: Fault, effect: FaultModel, period: float) -> None:
         self.effect = effect
         self.began: int | None = None  # tick
         self._when = fault.at if callable(fault.at) else None
         self._first = 0.0 if callable(fault.at) else _ticks(fault.at, period)
         self._length = _ticks(fault.for_, period)
 
-    def look(self, moment: Moment) -> None:
+    def look(self, moment: FaultContext) -> None:
         """Switch it on or off."""
         if self.began is None:
             if self._when(moment) if self._when else moment.tick >= self._first:
@@ -92,7 +92,7 @@ def _ticks(time: float | str, period: float) -> float:
     return time if isinstance(time, int) or math.isinf(time) else round(time / period)
 
 
-class Injection:
+class Injector:
     """A plan at work on one backend.
 
     Parameters
@@ -101,32 +101,32 @@ class Injection:
         The plan's.
     seed
         The plan's.
-    setup
+    facts
         Of the rig.
-    witness
-        Who looks on.
+    listener
+        Told of what passes.
     """
 
-    def __init__(self, faults: Sequence[Fault], seed: int, setup: Setup, witness: Witness) -> None:
-        self.witness = witness
+    def __init__(self, faults: Sequence[Fault], seed: int, facts: RigFacts, listener: FaultListener) -> None:
+        self.listener = listener
         self.board: Board | None = None
         self.timers: list[Timer] = []
-        self._setup = setup
+        self._facts = facts
         self._boot: Start | None = None
         self._tick = 0
         self._open = False
         self._first_began: int | None = None
         self._truth: Callable[[], Truth]
         for place, fault in enumerate(faults):
-            luck = random.Random(f"{seed} {place} {fault.kind}")  # noqa: S311 - it must repeat itself
-            effect = fault.make(setup, luck)
-            self.timers.append(Timer(fault, effect, setup.period))
+            rng = random.Random(f"{seed} {place} {fault.kind}")  # noqa: S311 - it must repeat itself
+            effect = fault.make(facts, rng)
+            self.timers.append(Timer(fault, effect, facts.period))
             if isinstance(effect, Start):
                 self._boot = effect
         effects = [timer.effect for timer in self.timers]
-        self._wire = [effect for effect in effects if isinstance(effect, WireEffect)]
-        self._plant = [effect for effect in effects if isinstance(effect, PlantEffect)]
-        self._host = [effect for effect in effects if isinstance(effect, HostEffect)]
+        self._wire = [effect for effect in effects if isinstance(effect, WireFault)]
+        self._plant = [effect for effect in effects if isinstance(effect, PlantFault)]
+        self._host = [effect for effect in effects if isinstance(effect, HostFault)]
 
     def board_arguments(self) -> dict[str, int]:
         """Return how a board is to boot."""
@@ -139,15 +139,15 @@ class Injection:
             "count_offset": round(start.number("count")),
         }
 
-    def attach(self, board: Board, carrier: str, pace: Pace) -> FaultyLink:
+    def attach(self, board: Board, carrier: str, pace: Pacer) -> FaultyLink:
         """Take hold of a board; return the line to it."""
         self.board = board
-        board.pins.befall(self)
+        board.pins.inject(self)
         self._truth = board.truth
         link = FaultyLink(board, carrier, pace, self)
         for effect in self._host:
-            effect.elapse = lambda seconds: link.elapse(round(seconds / self._setup.period))
-        self.witness.attached(board)
+            effect.elapse = lambda seconds: link.elapse(round(seconds / self._facts.period))
+        self.listener.attached(board)
         self._look()
         return link
 
@@ -157,7 +157,7 @@ class Injection:
             effect.elapse = lambda seconds: clock.sleep_until_ns(clock.now_ns() + round(1e9 * seconds))
         faulty = FaultyPlant(plant, self, ticking=True)
         self._truth = lambda: faulty.truth
-        self.witness.attached(None)
+        self.listener.attached(None)
         self._look()
         return faulty, self.encoder(encoder)
 
@@ -183,7 +183,7 @@ class Injection:
 
     def _look(self) -> None:
         tick = self._tick if self._open else -(10**9)
-        moment = Moment(tick, tick * self._setup.period, self._truth())
+        moment = FaultContext(tick, tick * self._facts.period, self._truth())
         for timer in self.timers:
             timer.look(moment)
         if self._first_began is None and self.board and any(timer.effect.on for timer in self.timers):
@@ -212,7 +212,7 @@ class Injection:
         return [piece for effect in self._wire for piece in effect.released(way)]
 
     @property
-    def acting_on_plant(self) -> list[PlantEffect]:
+    def acting_on_plant(self) -> list[PlantFault]:
         """Those that are on."""
         return [effect for effect in self._plant if effect.on]
 

@@ -6,8 +6,8 @@ import ctypes
 import functools
 
 from dcmp_hil.errors import OpenError
-from sim_backend import firmware
-from sim_backend.board_config import LAYOUT
+from sim_backend.board import build
+from sim_backend.board.config import LAYOUT
 
 CARRIERS = {"cobs": 0, "slcan": 1, "can": 2}
 """By name; `can` gives records instead of bytes: identifier, length, 8 bytes of data."""
@@ -40,7 +40,7 @@ def load() -> ctypes.PyDLL:
     OpenError
         If it cannot be compiled or loaded.
     """
-    path = firmware.library()
+    path = build.library()
     try:
         library = ctypes.PyDLL(str(path))
     except OSError as error:
@@ -55,5 +55,5 @@ def load() -> ctypes.PyDLL:
     for name in _ALWAYS:
         getattr(library, f"hostlib_{name}").restype = None
     if library.hostlib_config_size() != LAYOUT.size:
-        raise AssertionError(f"{path}: struct dcmp_config is not what sim_backend.board_config says")
+        raise AssertionError(f"{path}: struct dcmp_config is not what sim_backend.board.config says")
     return library

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dcmp_hil.errors import OpenError
 
-_HERE = Path(__file__).parent
+_HERE = Path(__file__).parents[1]
 _PLACES = (_HERE / "firmware", _HERE.parent / "firmware")  # in the wheel; in a checkout
 _FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
 _SECONDS = 120

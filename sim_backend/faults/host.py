@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+from sim_backend.faults.base import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,7 @@ class InjectedBaseError(BaseException):
     """The same, beyond `except Exception`."""
 
 
-class HostEffect(Effect):
+class HostFault(FaultModel):
     """Between the stages of a period."""
 
     elapse: Callable[[float], None]
@@ -42,7 +42,7 @@ class HostEffect(Effect):
         return demand
 
 
-class Spoil(HostEffect):
+class Spoil(HostFault):
     """A number of the period is none."""
 
     def sample(self, sample: Sample) -> Sample:
@@ -66,7 +66,7 @@ class Spoil(HostEffect):
         return {name: self._value} if where == stage else {}
 
 
-class Raise(HostEffect):
+class Raise(HostFault):
     """Observer or controller raises."""
 
     def estimate(self, estimate: Estimate) -> Estimate:
@@ -86,7 +86,7 @@ class Raise(HostEffect):
         raise kinds[self.word("what")](f"injected: {self.word('where')}")
 
 
-class Diverge(HostEffect):
+class Diverge(HostFault):
     """The observer's estimate grows without bound, as with a wrong gain."""
 
     _factor = 1.0
@@ -99,7 +99,7 @@ class Diverge(HostEffect):
         return estimate._replace(position=x1 + 1e-3 * grown, velocity=x2 + grown, disturbance=w + grown)
 
 
-class Slow(HostEffect):
+class Slow(HostFault):
     """The controller takes its time, now and then, or `times` times at the most."""
 
     _left: int | None = None
@@ -107,9 +107,9 @@ class Slow(HostEffect):
     def demand(self, demand: float) -> float:
         """Take it."""
         left = round(self.number("times")) if self._left is None else self._left
-        if left and self.luck.random() < self.number("p"):
+        if left and self.rng.random() < self.number("p"):
             left -= 1
-            self.elapse(1e-3 * self.number("ms") * (1.0 + self.number("more") * self.luck.random()))
+            self.elapse(1e-3 * self.number("ms") * (1.0 + self.number("more") * self.rng.random()))
         self._left = left
         return demand
 

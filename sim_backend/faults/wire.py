@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from sim_backend.fault_kinds.effect import Choice, Effect, Kind, Number
+from sim_backend.faults.base import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
-    from sim_backend.board import Board
-    from sim_backend.fault_kinds.effect import Setup, Value
+    from sim_backend.board.board import Board
+    from sim_backend.faults.base import RigFacts, Value
 
 Way = Literal["up", "down"]
 """`up`: from host to device."""
@@ -24,11 +24,11 @@ def _probability(default: float) -> Number:
     return Number("", 0.0, 1.0, default)
 
 
-class WireEffect(Effect):
+class WireFault(FaultModel):
     """A piece in, pieces out; on CAN a piece is a frame, its identifier in front."""
 
-    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
-        super().__init__(setup, luck, **params)
+    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
+        super().__init__(facts, rng, **params)
         self._way = str(params.get("way", "both"))
 
     def affects(self, way: Way) -> bool:
@@ -44,12 +44,12 @@ class WireEffect(Effect):
         return []
 
 
-class Lucky(WireEffect):
+class Lucky(WireFault):
     """Befalls a piece with probability p."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
         """Leave most as they are."""
-        return self.spoil(piece) if self.luck.random() < self.number("p") else (piece,)
+        return self.spoil(piece) if self.rng.random() < self.number("p") else (piece,)
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:  # noqa: ARG002
         """Return what becomes of one."""
@@ -67,7 +67,7 @@ class Drop(Lucky):
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
         """Lose it, or not."""
-        if self._left[way] == 0 and self.luck.random() < self.number("p"):
+        if self._left[way] == 0 and self.rng.random() < self.number("p"):
             self._left[way] = round(self.number("burst"))
         if self._left[way]:
             self._left[way] -= 1
@@ -89,8 +89,8 @@ class Flip(Lucky):
     def spoil(self, piece: bytes) -> Iterable[bytes]:
         """Turn some over."""
         changed = bytearray(piece)
-        end = len(piece) - (self.setup.carrier != "can")
-        for place in self.luck.sample(range(8 * end), min(round(self.number("bits")), 8 * end)):
+        end = len(piece) - (self.facts.carrier != "can")
+        for place in self.rng.sample(range(8 * end), min(round(self.number("bits")), 8 * end)):
             changed[place // 8] ^= 1 << place % 8
         return (bytes(changed),)
 
@@ -108,8 +108,8 @@ class Insert(Lucky):
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
         """Cut it open."""
-        place = self.luck.randrange(len(piece) + 1)
-        return (piece[:place] + self.luck.randbytes(round(self.number("bytes"))) + piece[place:],)
+        place = self.rng.randrange(len(piece) + 1)
+        return (piece[:place] + self.rng.randbytes(round(self.number("bytes"))) + piece[place:],)
 
 
 class Garbage(Lucky):
@@ -117,7 +117,7 @@ class Garbage(Lucky):
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
         """Put noise first."""
-        return self.luck.randbytes(round(self.number("bytes"))), piece
+        return self.rng.randbytes(round(self.number("bytes"))), piece
 
 
 class Garble(Lucky):
@@ -125,14 +125,14 @@ class Garble(Lucky):
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
         """Replace it."""
-        return (self.luck.randbytes(len(piece)),)
+        return (self.rng.randbytes(len(piece)),)
 
 
-class Timed(WireEffect):
+class Timed(WireFault):
     """Keeps pieces for later."""
 
-    def __init__(self, setup: Setup, luck: random.Random, **params: Value) -> None:
-        super().__init__(setup, luck, **params)
+    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
+        super().__init__(facts, rng, **params)
         self._now = 0
         self._waiting: dict[Way, list[tuple[int, bytes]]] = {"up": [], "down": []}
 
@@ -165,9 +165,9 @@ class Reorder(Timed):
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
         """Keep it, or not."""
-        if self.luck.random() >= self.number("p"):
+        if self.rng.random() >= self.number("p"):
             return (piece,)
-        self.keep(piece, way, 1 + self.luck.randrange(round(self.number("depth"))))
+        self.keep(piece, way, 1 + self.rng.randrange(round(self.number("depth"))))
         return ()
 
 
@@ -188,7 +188,7 @@ class Hold(Timed):
         return ()
 
 
-class Unplug(Effect):
+class Unplug(FaultModel):
     """The line hangs up; with an end it is plugged in again."""
 
     _board: Board | None = None

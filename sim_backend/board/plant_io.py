@@ -12,12 +12,12 @@ from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from sim_backend.fault_kinds.injection import Injection
+    from sim_backend.faults.injector import Injector
 
 _WORD = 0xFFFF_FFFF
 
 
-class Pins:
+class PlantIO:
     """The plant, wired as the rig says: a positive command may lower the arm, a rising arm count down.
 
     Parameters
@@ -46,7 +46,7 @@ class Pins:
             voltage = self._stage.step()
         self.truth = self._plant.advance(voltage)
 
-    def befall(self, faults: Injection) -> None:
+    def inject(self, faults: Injector) -> None:
         """Let faults come between the pins and the plant, instead of earlier ones."""
         plant, encoder = self._healthy
         self._plant, self._encoder = faults.plant(plant), faults.encoder(encoder)

@@ -1,1 +1,0 @@
-"""What can go wrong with a simulated rig, level by level: wire, firmware, plant, host."""
