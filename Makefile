@@ -21,7 +21,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults mutants firmware bench lock clean
+.PHONY: help run test check pytest faults mutants firmware bench lock clean encoders
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -62,6 +62,9 @@ mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/f
 
 firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes
 	@$(BIN)/python -m tools.artefact
+
+encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
+	@$(BIN)/python -m tools.encoders $(ARGS)
 
 bench: $(DEV) ## measure, print a table
 	@$(BIN)/python -m tools.bench $(ARGS)

@@ -15,12 +15,12 @@ from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
 from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins import find_named
 from dcmp_hil.predictor import Predictor
-from dcmp_hil.probe import Probe
+from dcmp_hil.probe import probe_for
 from dcmp_hil.supervisor import Supervisor
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 _SETTLE, _ENGAGE = 0.25, 0.25  # s: ten time constants of the observer, then a ramp of authority
-_PROBE_V, _OVER_FRICTION = 1.0, 2.0  # V; friction that a push must overcome by so much
-_WATCH_FLOOR = 100.0  # rad/s, mu0 of the watching observer
 
 
 def assemble(
@@ -122,13 +120,17 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
     monitors: list[Monitor] = [Finite()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
-        watch = SuperTwisting(setting, mu0=min(_WATCH_FLOOR, 0.3 / rig.period))
+        watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
         monitors += [
             Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
             DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2),
         ]
     immediate = limits.start == "immediate"
-    probe = None if immediate or limits.probe == "off" else make_probe(rig)
+    probe = (
+        None
+        if immediate or limits.probe == "off"
+        else probe_for(rig.model.values(), rig.amplifier.limit, rig.encoder.count, notify)
+    )
     return Supervisor(
         monitors,
         make_limits(rig, notify),
@@ -161,14 +163,6 @@ def make_outliers(rig: Rig, supervisor: Supervisor) -> Outliers:
     limits = rig.supervisor
     fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf
     return Outliers(fastest, rig.period, rig.encoder.count, supervisor.stop_now)
-
-
-def make_probe(rig: Rig) -> Probe | None:
-    """Make the probe of a rig; None where its encoder is too coarse to tell."""
-    model = rig.model.values()
-    voltage = min(rig.amplifier.limit, max(_PROBE_V, _OVER_FRICTION * model.f1 / model.ku))
-    probe = Probe(model.ku, voltage, rig.encoder.count)
-    return probe if probe.telling else None
 
 
 def _make_custom(section: Custom, setting: object, key: str) -> Any:

@@ -94,14 +94,14 @@ class Diagnosis:
         judge = _Judge(t, shown, self._noise)
         driven = self._model.ku * voltage
         fallen = -self._model.gravity * np.sin(position)
-        expected = position - _moved(t, driven + fallen)
+        expected = position - moved_by(t, driven + fallen)
         found: dict[str, list[float]] = {"other": [], "power": [], "motor": [], "encoder": [], "stuck": []}
         for onset in np.unique(np.linspace(0, len(t) - _FEWEST // 2, _ONSETS).astype(int)):
             after = np.arange(len(t)) > onset
-            late, early = _moved(t, driven * after), _moved(t, driven * ~after)
-            push = _moved(t, after.astype(float))
+            late, early = moved_by(t, driven * after), moved_by(t, driven * ~after)
+            push = moved_by(t, after.astype(float))
             mirrored = np.where(after, 2.0 * position[onset] - position, position)
-            turned = mirrored - _moved(t, driven - self._model.gravity * np.sin(mirrored))
+            turned = mirrored - moved_by(t, driven - self._model.gravity * np.sin(mirrored))
             found["other"].append(judge.weigh(expected, (early + late, _GAIN), (push, _PUSH)))
             found["power"].append(judge.weigh(expected + late, (early, _GAIN), (late, _DEAD)))
             found["motor"].append(judge.weigh(expected + 2.0 * late, (early - late, _GAIN)))
@@ -112,7 +112,7 @@ class Diagnosis:
             yield reasons.get(name, _OTHER), float(np.logaddexp.reduce(logs))
 
 
-def _moved(t: Vector, acceleration: Vector) -> Vector:
+def moved_by(t: Vector, acceleration: Vector) -> Vector:
     """Integrate accelerations twice, each held over the period that ends at its instant."""
     step = np.diff(t, prepend=t[0])
     velocity = np.cumsum(step * acceleration)

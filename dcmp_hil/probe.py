@@ -3,24 +3,72 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.diagnosis import moved_by
 from dcmp_hil.errors import TripError
+from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
+
+    from dcmp_hil.model import Model
+    from dcmp_hil.values import Sample
 
 WATCH = 0.1  # s at 0 V: is the arm at rest
 PUSH = 0.1  # s each way at most
+_PROBE_V, _OVER_FRICTION = 1.0, 2.0  # V; friction that a push must overcome by so much
 _REST = 0.02  # rad, that the arm may move while it is watched
 _FAR = 0.03  # rad, at which a push ends early: the whole probe stays within 0.1 rad
-_SPREAD = 3.0  # measured over believed motor gain, either way
+_RISEN, _COASTS, _COASTED = 0.9, 3.0, 0.032  # of the voltage; of the mean speed; rad, where a slow push ends
+_FARTHEST = 0.08  # rad, at which the way back ends early: a slow amplifier turns late
+_REACHED = 0.6  # of the voltage asked for, that must be applied: friction alone may need half
+_SPREAD = 3.0  # measured over believed motor gain, either way, beyond which the probe refuses
+_OFF = 1.25  # beyond which it warns
 _SURE = 4.0  # standard deviations
 _NOISE, _LEAST = 0.4, 1e-4  # counts and rad, of a position
 _PUSHED, _STRONGEST = 2.0, 3.0  # rad/s2, what may push besides; times the believed motor gain
 _TELLING = 2.0  # counts that a push must be expected to move the arm by
+
+
+class MotorGain(NamedTuple):
+    """What the probe found of the motor."""
+
+    gain: float  # (rad/s2)/V, ku/J
+    deviation: float  # (rad/s2)/V, standard deviation
+    believed: float  # (rad/s2)/V, model.ku_rad_s2_V
+
+    @property
+    def ratio(self) -> float:
+        """Measured over believed."""
+        return self.gain / self.believed
+
+    def document(self) -> dict[str, float]:
+        """Return what `run --json` holds of it."""
+        return {
+            "gain_rad_s2_V": self.gain,
+            "deviation_rad_s2_V": self.deviation,
+            "model_rad_s2_V": self.believed,
+            "ratio": self.ratio,
+        }
+
+    def told(self, t: float) -> Event:
+        """Say it; a warning where the model is further off than 1.25, by more than the fit's own doubt."""
+        doubt = self.deviation / self.believed
+        off = self.ratio - doubt > _OFF or self.ratio + doubt < 1.0 / _OFF
+        said = (
+            f"probe: motor gain {self.gain:.3g} +- {self.deviation:.2g} (rad/s2)/V, "
+            f"{self.ratio:.2f} times [model]'s {self.believed:g}"
+        )
+        if not off:
+            return Event(t, "INFO", said)
+        return Event(
+            t, "WARN", f"{said}. Look at model.ku_rad_s2_V, motor supply, gear and encoder.counts_per_rev."
+        )
 
 
 class Probe:
@@ -38,14 +86,26 @@ class Probe:
         V, of a push.
     count
         rad, one count of the encoder; 0 for an ideal one.
+    notify
+        Told of the motor's gain.
+
+    Attributes
+    ----------
+    found
+        The motor's gain; None before the probe is over.
     """
 
-    def __init__(self, ku: float, voltage: float, count: float) -> None:
+    def __init__(
+        self, ku: float, voltage: float, count: float, notify: Callable[[Event], None] | None = None
+    ) -> None:
         self._ku, self._voltage, self._count = ku, voltage, count
         self._began = math.nan  # s, of the present stage
         self._x0 = math.nan  # rad, where the arm was as the stage of watching, and then the pushes, began
-        self._seen: list[tuple[float, float]] = []  # s and rad since the pushes began
+        self._seen: list[tuple[float, float, float]] = []  # s and rad since the pushes began, V applied
+        self._notify = notify
+        self.found: MotorGain | None = None
         self._length = math.nan  # s, of the first push
+        self._rise = 0.0  # s, that the voltage applied takes to get there, and takes to get back
         self._stage = self._watch
 
     @property
@@ -53,58 +113,66 @@ class Probe:
         """Whether the encoder is fine enough for the probe to say anything."""
         return 0.5 * self._ku * self._voltage * PUSH * PUSH > _TELLING * self._count
 
-    def voltage_at(self, t: float, position: float) -> float | None:
+    def voltage_at(self, sample: Sample) -> float | None:
         """Return the voltage for this period, V; None when the probe is over and all is well.
 
         Raises
         ------
         TripError
-            ``moving``, ``power``, ``polarity`` or ``gain``: the rig is not what the file says.
+            ``moving``, ``power``, ``slew``, ``polarity`` or ``gain``: the rig is not what the file says.
         """
         if math.isnan(self._began):
-            self._began, self._x0 = t, position
-        return self._stage(t - self._began, t, position)
+            self._began, self._x0 = sample.t, sample.position
+        return self._stage(sample.t - self._began, sample)
 
-    def _watch(self, since: float, t: float, position: float) -> float | None:
-        if not -_REST <= position - self._x0 <= _REST:
+    def _watch(self, since: float, sample: Sample) -> float | None:
+        moved = sample.position - self._x0
+        if not -_REST <= moved <= _REST:
             raise TripError(
                 "moving",
-                f"The arm moves by itself: {position - self._x0:+.3f} rad in {since:.3f} s at 0 V.",
+                f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
                 'Bring it to rest, hanging, and start again; supervisor.probe = "off" starts without it.',
             )
         if since < WATCH:
             return 0.0
-        return self._begin(self._push_up, t, position, self._voltage)
+        self._began, self._x0 = sample.t, sample.position
+        self._seen = [(0.0, sample.position, 0.0)]
+        self._stage = self._push_up
+        return self._voltage
 
-    def _push_up(self, since: float, t: float, position: float) -> float | None:
-        self._seen.append((since, position))
-        if since < PUSH and abs(position - self._x0) < _FAR:
+    def _push_up(self, since: float, sample: Sample) -> float | None:
+        self._seen.append((since, sample.position, sample.voltage))
+        moved = abs(sample.position - self._x0)
+        if not abs(sample.voltage) >= _RISEN * self._voltage:
+            self._rise = since
+        coasting = _COASTS * moved / since * self._rise if since > 0.0 else 0.0
+        if since < PUSH and moved < _FAR and moved + coasting < _COASTED:
             return self._voltage
-        self._length, self._began = since, t
+        self._length, self._began = since, sample.t
         self._stage = self._push_down
         return -self._voltage
 
-    def _push_down(self, since: float, t: float, position: float) -> float | None:  # noqa: ARG002
-        self._seen.append((self._length + since, position))
-        if since < self._length:
+    def _push_down(self, since: float, sample: Sample) -> float | None:
+        self._seen.append((self._length + since, sample.position, sample.voltage))
+        if since < self._length and abs(sample.position - self._x0) < _FARTHEST:
             return -self._voltage
         self._judge(np.array(self._seen).T)
+        if self._notify and self.found:
+            self._notify(self.found.told(sample.t))
         return None
-
-    def _begin(self, stage: object, t: float, position: float, voltage: float) -> float:
-        self._began, self._x0 = t, position
-        self._seen = [(0.0, position)]
-        self._stage = stage  # type: ignore[assignment]
-        return voltage
 
     def _judge(self, seen: NDArray[np.float64]) -> None:
         """Compare the measured motor gain with the believed one; an encoder's step is given the benefit."""
         moved = seen[1] - self._x0
         up, farthest = moved[np.searchsorted(seen[0], self._length)], float(np.abs(moved).max())
-        gain, deviation = self._gain(seen[0], moved)
+        gain, deviation = self._gain(seen[0], moved, seen[2])
+        self.found = MotorGain(gain, deviation, self._ku)
         unsure = _SURE * deviation
         volts, down = f"{self._voltage:g} V", moved[-1] - up
         said = f"+{volts} moved the arm by {up:+.4f} rad, -{volts} by {down:+.4f} rad"
+        unclear = not gain - unsure > 0.0 and gain + unsure > 0.0
+        if not farthest > self._count or unclear:
+            self._refuse_slow(float(np.abs(seen[2]).max()))
         if not farthest > self._count:
             raise TripError(
                 "power",
@@ -130,14 +198,46 @@ class Probe:
                 "Look at encoder.counts_per_rev (after quadrature), at the gear, and at model.ku_rad_s2_V.",
             )
 
-    def _gain(self, t: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[float, float]:
+    def _refuse_slow(self, reached: float) -> None:
+        """Find the fault with the amplifier, where it put out too little for the arm to answer."""
+        if not reached >= _REACHED * self._voltage:
+            raise TripError(
+                "slew",
+                f"The amplifier put out {reached:.2g} V of the {self._voltage:g} V asked for in "
+                f"{self._length:.2g} s, too little to move the arm.",
+                "Look at the slew limit of the device and at amplifier.slew_V_s: 20 V/s and more would do.",
+            )
+
+    def _gain(
+        self, t: NDArray[np.float64], moved: NDArray[np.float64], applied: NDArray[np.float64]
+    ) -> tuple[float, float]:
         """Fit the motor's gain and a constant push to the way out: until it turns, friction is constant."""
         out = int(np.flatnonzero(np.abs(moved) == np.abs(moved).max())[-1]) + 1
-        t, moved = t[:out], moved[:out]
-        late = np.maximum(t - self._length, 0.0)
-        columns = np.column_stack([np.ones_like(t), 0.5 * t * t, 0.5 * t * t - late * late])
+        t, moved, applied = t[:out], moved[:out], applied[:out]
+        columns = np.column_stack([np.ones_like(t), 0.5 * t * t, moved_by(t, applied)])
         noise = math.hypot(_NOISE * self._count, _LEAST)
-        usual = np.array([max(self._count, _LEAST), _PUSHED, _STRONGEST * self._ku * self._voltage])
+        usual = np.array([max(self._count, _LEAST), _PUSHED, _STRONGEST * self._ku])
         covariance = np.linalg.inv(columns.T @ columns / noise**2 + np.diag(usual**-2))
         gain = (covariance @ columns.T @ moved)[2] / noise**2
-        return float(gain / self._voltage), float(np.sqrt(covariance[2, 2]) / self._voltage)
+        return float(gain), float(np.sqrt(covariance[2, 2]))
+
+
+def probe_for(
+    model: Model, voltage_limit: float, count: float, notify: Callable[[Event], None] | None = None
+) -> Probe | None:
+    """Make the probe of a rig; None where its encoder is too coarse to tell.
+
+    Parameters
+    ----------
+    model
+        What the host believes of the pendulum.
+    voltage_limit
+        V, of the amplifier.
+    count
+        rad, one count of the encoder; 0 for an ideal one.
+    notify
+        Told of the motor's gain.
+    """
+    voltage = min(voltage_limit, max(_PROBE_V, _OVER_FRICTION * model.f1 / model.ku))
+    probe = Probe(model.ku, voltage, count, notify)
+    return probe if probe.telling else None

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backends.device import LinkCounters
     from dcmp_hil.config import Rig
     from dcmp_hil.live import Control
+    from dcmp_hil.probe import MotorGain
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
 
@@ -67,6 +68,8 @@ class Result:
         Its first hundred warnings and errors, with their time; kept where events are not, too.
     changes
         What was changed while it went on, in words.
+    motor_gain
+        What the probe found of the motor; None without a probe.
     """
 
     rig: Rig
@@ -81,6 +84,7 @@ class Result:
     outliers: int = 0
     troubles: tuple[str, ...] = ()
     changes: tuple[str, ...] = ()
+    motor_gain: MotorGain | None = None
 
 
 _AT_ZERO: tuple[Literal["INFO", "WARN"], str] = ("INFO", "amplifier at 0 V")
@@ -253,6 +257,7 @@ class Session:
             outliers=self._line.outliers.count,
             troubles=tuple(self._figures.troubles),
             changes=tuple(getattr(self._line.changes, "made", ())),
+            motor_gain=self._line.supervisor.motor_gain,
         )
 
 

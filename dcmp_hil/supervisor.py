@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.limits import Limits
     from dcmp_hil.monitors import Monitor
-    from dcmp_hil.probe import Probe
+    from dcmp_hil.probe import MotorGain, Probe
     from dcmp_hil.values import Estimate, Sample
 
 
@@ -118,6 +118,11 @@ class Supervisor:
         self.stopping = False
         self.trip: DcmpError | None = None
 
+    @property
+    def motor_gain(self) -> MotorGain | None:
+        """What the probe found of the motor; None without one, and before it is over."""
+        return self._probe.found if self._probe else None
+
     def engages(self, sample: Sample) -> bool:
         """Move on to the phase of this period; True in the first of ENGAGING, when the trajectory starts."""
         if self._has_authority:
@@ -168,7 +173,7 @@ class Supervisor:
     def _go_on_probing(self, sample: Sample) -> None:
         assert self._probe is not None  # noqa: S101 - the table leads here only with one
         try:
-            push = self._probe.voltage_at(sample.t, sample.position)
+            push = self._probe.voltage_at(sample)
         except TripError as refusal:
             self.stop_now(refusal, sample.t)
             return

@@ -8,25 +8,34 @@ import pytest
 
 from dcmp_hil.errors import TripError
 from dcmp_hil.probe import Probe
+from dcmp_hil.values import Event, Sample
 
 T = 1e-3
 KU = 5.4
 
 
 def probe(
-    gain: float = 1.0, *, count: float = 0.0, friction: float = 0.0, drift: float = 0.0
+    gain: float = 1.0,
+    *,
+    count: float = 0.0,
+    friction: float = 0.0,
+    drift: float = 0.0,
+    slew: float = math.inf,
+    told: list[Event] | None = None,
 ) -> tuple[float, list[float]]:
     """Let a probe try a motor that is `gain` times what it believes; return the way it went, the voltages."""
-    made = Probe(KU, 1.0, count)
+    made = Probe(KU, 1.0, count, None if told is None else told.append)
     x = v = 0.0
     farthest = 0.0
     sent: list[float] = []
+    applied = 0.0
     for k in range(2000):
         seen = count * round(x / count) if count else x
-        voltage = made.voltage_at(k * T, seen)
+        voltage = made.voltage_at(Sample(k * T, seen, applied))
         if voltage is None:
             return farthest, sent
         sent.append(voltage)
+        applied = voltage = max(applied - slew * T, min(applied + slew * T, voltage))
         v += T * (gain * KU * voltage + drift)
         v = math.copysign(max(0.0, abs(v) - T * friction), v)
         x += T * v
@@ -70,11 +79,46 @@ def test_probe_refuses_an_arm_that_moves_by_itself(drift: float) -> None:
 
 def test_probe_refuses_nan() -> None:
     made = Probe(KU, 1.0, 0.0)
-    made.voltage_at(0.0, 0.0)
+    made.voltage_at(Sample(0.0, 0.0, 0.0))
     with pytest.raises(TripError):
-        made.voltage_at(T, math.nan)
+        made.voltage_at(Sample(T, math.nan, 0.0))
 
 
 @pytest.mark.parametrize(("counts", "telling"), [(4096, True), (1000, True), (16, False)])
 def test_probe_knows_when_the_encoder_is_too_coarse(counts: int, telling: bool) -> None:
     assert Probe(KU, 1.0, math.tau / counts).telling is telling
+
+
+@pytest.mark.parametrize(
+    ("gain", "level"),
+    [(1.0, "INFO"), (1.15, "INFO"), (0.9, "INFO"), (1.4, "WARN"), (1.85, "WARN"), (0.6, "WARN")],
+)
+def test_probe_tells_the_motor_gain_and_warns_where_the_model_is_off(gain: float, level: str) -> None:
+    told: list[Event] = []
+    probe(gain, count=math.tau / 4096, told=told)
+    (event,) = told
+    assert event.level == level
+    ratio = float(event.text.partition(" times [model]")[0].rpartition(" ")[2])
+    assert ratio == pytest.approx(gain, rel=0.08)
+
+
+@pytest.mark.parametrize("gain", [0.6, 1.0, 1.85])
+@pytest.mark.parametrize("slew", [5.0, 10.0, 20.0, 50.0, 100.0, 1000.0])
+def test_probe_judges_by_the_voltage_that_a_slow_amplifier_really_puts_out(gain: float, slew: float) -> None:
+    told: list[Event] = []
+    farthest, _ = probe(gain, count=math.tau / 4096, slew=slew, told=told)
+    ratio = float(told[0].text.partition(" times [model]")[0].rpartition(" ")[2])
+    assert ratio == pytest.approx(gain, rel=0.15)
+    assert farthest <= 0.12
+    with pytest.raises(TripError) as caught:
+        probe(-gain, count=math.tau / 4096, slew=slew)
+    assert caught.value.reason == "polarity"
+
+
+def test_probe_names_the_slew_limit_where_too_little_voltage_came_out() -> None:
+    with pytest.raises(TripError, match=r"put out 0\.1 V of the 1 V") as caught:
+        probe(1.0, count=math.tau / 4096, friction=1.3, slew=1.0)
+    assert caught.value.reason == "slew"
+    with pytest.raises(TripError) as caught:  # all the voltage came out, and nothing moved
+        probe(0.0, count=math.tau / 4096, slew=50.0)
+    assert caught.value.reason == "power"

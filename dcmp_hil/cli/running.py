@@ -163,6 +163,7 @@ def _conclude(
         "link": None if result.link is None else asdict(result.link),
         "overruns": result.overruns,
         "outliers": result.outliers,
+        "motor_gain": result.motor_gain and result.motor_gain.document(),
         "troubles": result.troubles,
         "changes": result.changes,
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},

@@ -12,6 +12,7 @@ from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
+from dcmp_hil.probe import probe_for
 from dcmp_hil.references.periodic import Chirp, Sine
 from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 
@@ -113,9 +114,20 @@ def _immediate(rig: Rig) -> str:
 
 
 def _probe(rig: Rig) -> str:
+    if rig.supervisor.probe == "first" and rig.supervisor.start == "engage":
+        return _coarse(rig)
     if rig.supervisor.probe == "first" or not isinstance(rig.backend, Serial | Can):
         return ""
     return 'supervisor.probe = "off": a motor or encoder wired the wrong way is found by running away.'
+
+
+def _coarse(rig: Rig) -> str:
+    if probe_for(rig.model.values(), rig.amplifier.limit, rig.encoder.count) is not None:
+        return ""
+    return (
+        f"encoder.counts_per_rev = {rig.encoder.counts:g}: too coarse for the probe before the start; a "
+        "motor or encoder wired the wrong way is found by running away, in up to 0.35 s."
+    )
 
 
 def _is_ideal(rig: Rig) -> bool:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config.rig import Rig
     from dcmp_hil.section import Section
 
+_COARSEST_ENCODER = 256  # counts a revolution
 _LEAST = 1e-6  # of any key that must be above 0
 _REASON = {  # by unit: the largest that anybody may mean
     "1_s": 1e5,
@@ -99,6 +100,18 @@ def _link_carries_rate(rig: Rig) -> str:
     )
 
 
+def _encoder_shows_faults(rig: Rig) -> str:
+    """Refuse an encoder so coarse that a fault of it is found too late; see docs/safety.md."""
+    counts = rig.encoder.counts
+    if counts is None or counts >= _COARSEST_ENCODER or rig.supervisor.monitors != "all":
+        return ""
+    return (
+        f"encoder.counts_per_rev: got {number(counts)}; below {_COARSEST_ENCODER} a stuck encoder or lost "
+        "motor power is found later than the 600 ms that are promised. Count all four edges (quadrature), or "
+        'take a finer encoder; in simulation supervisor.monitors = "finite" runs without the watch.'
+    )
+
+
 def _within_reason(rig: Rig) -> str:
     """Refuse what only a wrong unit explains, in the tables that do not say how large their keys may be."""
     sections: dict[str, Section] = {
@@ -145,5 +158,6 @@ RULES: tuple[Callable[[Rig], str], ...] = (
     _simulation_only,
     _whole_units,
     _link_carries_rate,
+    _encoder_shows_faults,
 )
 """Each returns its faults, one a line, beginning with the key; empty if there is none."""

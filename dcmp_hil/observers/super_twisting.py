@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _new = tuple.__new__  # half the time of a NamedTuple's own
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
 _SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that
+_WATCH_FACTOR, _WATCH_FASTEST = 2.5, 100.0  # times the rule; rad/s
 _NOTHING = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
 
 
@@ -72,6 +73,15 @@ def bandwidth_floor(counts_per_rev: float | None, period: float) -> float:
         return largest
     usual: float = 40.0 * (counts_per_rev / 4096.0) ** (1 / 3) * (1e-3 / period) ** (1 / 6)
     return min(usual, largest)
+
+
+def watch_floor(counts_per_rev: float | None, period: float) -> float:
+    """Return mu0 of the observer that watches, rad/s: 2.5 times the rule, and no faster than at 4096 counts.
+
+    One count of the encoder shows as a disturbance of about mu0^2 counts: an observer as fast as that on a
+    coarse encoder would take the encoder's own steps for a push.
+    """
+    return min(_WATCH_FASTEST, 0.3 / period, _WATCH_FACTOR * bandwidth_floor(counts_per_rev, period))
 
 
 def slope_bound(counts_per_rev: float | None) -> float:

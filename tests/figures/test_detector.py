@@ -1,76 +1,22 @@
-"""What the host's monitors find, and how soon: "Detectors worth having" of the safety page.
-
-The bounds count while |x_r'| > 0.1 rad/s, from the fault or from the moment it exceeds it: with the arm and
-its reference at rest these faults change nothing that could be seen.
-"""
+"""What the host's monitors find, and how soon: "Detectors worth having" of the safety page."""
 
 from __future__ import annotations
 
 import math
 from statistics import median
-from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from dcmp_hil import run
 from dcmp_hil.errors import TripError
 from dcmp_hil.monitors import DisturbanceWatch
 from dcmp_hil.observers.super_twisting import SuperTwisting
-from dcmp_hil.session import Session
 from dcmp_hil.values import Estimate, Sample
 from tests import helpers
+from tests.figures.detection import ENGAGED, detect
 from tests.helpers import STEADY, FaultySim, T, bench, setting
 
 pytestmark = pytest.mark.usefixtures("untraced")
-
-_SEEDS = range(20)
-_ENGAGED = 0.25  # s, when the trajectory starts
-
-
-class _Detection(NamedTuple):
-    fault_at: float  # s
-    tripped_at: float  # s, NaN if it never did
-    judged_from: float  # s
-    reason: str
-    speed: float  # rad/s, the plant's own, from the fault on
-    distance: float  # rad, the plant's own, from hanging, all the run
-
-    @property
-    def time(self) -> float:
-        return max(0.0, self.tripped_at - self.judged_from)
-
-
-def _first_motion(t: float) -> float:
-    """Return when |x_r'| = |cos((t - 0.25)/2)|/2 first exceeds 0.1 rad/s, from `t` on, s."""
-    while abs(0.5 * math.cos(0.5 * (t - _ENGAGED))) <= 0.1:
-        t += T
-    return t
-
-
-def _detect(backend: type[FaultySim], *overrides: str) -> list[_Detection]:
-    """Run into the fault at twenty instants and encoder phases."""
-    found = []
-    for seed in _SEEDS:
-        rig = bench(
-            f"backend.kind=tests.helpers:{backend.__name__}",
-            f"sim.seed={seed}",
-            f"sim.encoder_phase_counts={seed / 20}",
-            "supervisor.probe=off",
-            *overrides,
-        )
-        at = backend.instant(rig)
-        session = Session(rig, duration=at + 4.0, fast=True)
-        reason, tripped = "", math.nan
-        try:
-            session.run()
-        except TripError as trip:
-            reason, tripped = trip.reason, trip.cycles[-1].sample.t
-        columns = session.result().columns
-        speed = np.abs(columns["velocity_true_rad_s"][columns["time_s"] >= at]).max(initial=0.0)
-        distance = np.abs(columns["position_true_rad"]).max()
-        found.append(_Detection(at, tripped, _first_motion(at), reason, float(speed), float(distance)))
-    return found
 
 
 @pytest.mark.parametrize(
@@ -78,7 +24,7 @@ def _detect(backend: type[FaultySim], *overrides: str) -> list[_Detection]:
 )
 def test_blind_or_dead_motor_is_found_in_time(backend: type[FaultySim], reason: str) -> None:
     # E01, P02: 120 ms median, 600 ms at every seed; measured 74 and 132 ms (stuck), 89 and 209 ms (power)
-    found = _detect(backend)
+    found = detect(backend)
     assert {each.reason for each in found} == {reason}
     times = [each.time for each in found]
     assert median(times) <= 0.120
@@ -88,7 +34,7 @@ def test_blind_or_dead_motor_is_found_in_time(backend: type[FaultySim], reason: 
 
 def test_reversal_is_found_in_time_while_the_arm_moves() -> None:
     # P01: 300 ms, 3 rad/s; measured 54 ms median, 98 ms at most
-    found = _detect(helpers.Reversed)
+    found = detect(helpers.Reversed)
     assert {each.reason for each in found} == {"polarity"}
     assert max(each.tripped_at - each.fault_at for each in found) <= 0.300
     assert max(each.speed for each in found) <= 3.0
@@ -97,13 +43,13 @@ def test_reversal_is_found_in_time_while_the_arm_moves() -> None:
 @pytest.mark.parametrize(
     ("start", "live_from"),
     [
-        ("supervisor.start=engage", _ENGAGED),
+        ("supervisor.start=engage", ENGAGED),
         ("supervisor.start=immediate", 0.0),
     ],
 )
 def test_reversed_motor_is_found_in_time_from_rest(start: str, live_from: float) -> None:
     # safety.md: at most 230 ms (at rest) and 2.4 rad/s; bounds of P01
-    found = _detect(helpers.ReversedFromTheStart, start)
+    found = detect(helpers.ReversedFromTheStart, start)
     assert {each.reason for each in found} <= {"polarity", "disturbance"}
     assert max(each.tripped_at - live_from for each in found) <= 0.300
     assert max(each.speed for each in found) <= 3.0
@@ -185,7 +131,7 @@ def test_probe_finds_it_before_the_arm_has_moved_a_tenth_of_a_radian(
     backend: type[FaultySim], reason: str
 ) -> None:
     # P01: refused by the probe within 0.1 rad; dead and blind look the same to it
-    found = _detect(backend, "supervisor.probe=first")
+    found = detect(backend, "supervisor.probe=first")
     assert {each.reason for each in found} == {reason}
     assert max(each.tripped_at for each in found) <= 0.35
     assert max(each.distance for each in found) <= 0.1
