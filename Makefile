@@ -21,10 +21,10 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults mutants firmware bench lock clean encoders
+.PHONY: help run test check pytest faults mutants firmware bench encoders lock lockcheck clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 run: $(RUN) ## the simulated rig with its dashboard; ARGS="--help" for what else it takes
 	@$(BIN)/dcmp-hil run bench-1khz $(ARGS)
@@ -73,6 +73,12 @@ lock: | $(BIN)/uv ## pin again after a change in pyproject.toml; ARGS=--upgrade 
 	@echo "Pinning the dependencies ..."
 	@$(COMPILE) --extra plot --extra panel --output-file requirements.txt $(ARGS)
 	@$(COMPILE) --extra plot --extra panel --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
+
+lockcheck: $(DEV) ## the locks have a wheel of everything for each Python from 3.11 to 3.14; asks the index
+	@for version in 3.11 3.12 3.13 3.14; do for lock in requirements.txt requirements-dev.txt; do \
+		$(BIN)/uv --quiet pip install --dry-run --python-version $$version --python-platform linux --target build/none \
+			--no-deps --require-hashes --only-binary :all: -r $$lock || exit 1; \
+		echo "$$lock: complete for Python $$version"; done; done
 
 clean: ## remove the environment, caches and reports; recordings in runs/ stay
 	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov reports .coverage .coverage.* \
