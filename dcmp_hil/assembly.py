@@ -10,6 +10,7 @@ from dcmp_hil.backends import open_backend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.limits import Limits
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
+    from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
     from dcmp_hil.telemetry.apart import Apart
@@ -49,6 +51,7 @@ def assemble(
     in_line: bool,
     apart: Apart | None = None,
     mailbox: Mailbox | None = None,
+    faults: Faults = NO_FAULTS,
 ) -> tuple[Line, Recorder]:
     """Make every stage of the line, and the recorder that it reports to.
 
@@ -57,7 +60,7 @@ def assemble(
     ConfigError
         If a class named `module:Class` cannot be found or made.
     """
-    backend = open_backend(rig, clock)
+    backend = open_backend(rig, clock, faults)
     trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
@@ -78,10 +81,10 @@ def assemble(
     line = Line(
         backend=backend,
         outliers=make_outliers(rig, supervisor),
-        observer=observer,
+        observer=faults.observer(observer),
         predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
         trajectory=trajectory,
-        controller=controller,
+        controller=faults.controller(controller),
         supervisor=supervisor,
         telemetry=recorder,
         overruns=Overruns(rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None),

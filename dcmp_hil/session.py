@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,6 +13,7 @@ from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, OpenError, TripError
+from dcmp_hil.fault_injection import inject
 from dcmp_hil.host import host_facts, in_words, require_linux
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.realtime import Grant, RealTime
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backends.device import LinkCounters
     from dcmp_hil.config import Rig
+    from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live import Control
     from dcmp_hil.probe import MotorGain
     from dcmp_hil.telemetry.audience import Sink
@@ -115,6 +118,13 @@ class Session:
         Told, in a sentence, what of telemetry the run goes on without.
     control
         Who may change the run while it goes on; None for nobody.
+    faults
+        What goes wrong on purpose, as for `run`; or faults that are prepared for this rig already.
+
+    Raises
+    ------
+    ConfigError
+        If an argument does not fit the rig.
     """
 
     def __init__(
@@ -129,6 +139,7 @@ class Session:
         stop: StopRequest | None = None,
         warn: Callable[[str], None] | None = None,
         control: Control | None = None,
+        faults: Iterable[object] | Faults = (),
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
@@ -154,7 +165,13 @@ class Session:
         self._control = control
         mailbox = control.mailbox if control else None
         self._line, self._recorder = assemble(
-            rig, clock, here, in_line=fast, apart=self._apart, mailbox=mailbox
+            rig,
+            clock,
+            here,
+            in_line=fast,
+            apart=self._apart,
+            mailbox=mailbox,
+            faults=inject(rig, faults) if isinstance(faults, Iterable) else faults,
         )
         for sentence in sentences:
             self._recorder.event(Event(0.0, "WARN", sentence))
@@ -268,6 +285,7 @@ def run(
     fast: bool = False,
     window_from: float = 0.0,
     sinks: Sequence[Sink | SinkMaker] = (),
+    faults: Iterable[object] = (),
 ) -> Result:
     """Run a rig and return its cycles as columns and its figures.
 
@@ -286,6 +304,12 @@ def run(
         ``partial(RerunSink, rig=view_of(rig), record=Path("run.rrd"), viewer="spawn")``. In real time a
         function that can be pickled is called in the telemetry process, beside the loop; a sink that is there
         already runs on a thread of this process, which costs the loop its punctuality.
+    faults
+        What goes wrong on purpose on a simulated rig: texts as behind `dcmp-hil run --fault`, such as
+        ``["wire.drop:p=0.2,at=3s,for=1s", "plant.shove:at=2s"]``, or objects
+        ``Fault("plant.shove", at=2.0, rad_s2=300)`` of `sim_backend.faults.fault`, whose `at` may be a
+        function of time and true state. Everything random in them follows from `sim.seed`. Faults of the
+        wire and of the firmware need `backend.kind = "sim-board"`.
 
     Returns
     -------
@@ -303,7 +327,7 @@ def run(
     BackendError
         If the device or the way to it fails; with `.result`.
     """
-    session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks)
+    session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks, faults=faults)
     try:
         session.run()
     except DcmpError as error:

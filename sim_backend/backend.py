@@ -9,6 +9,7 @@ from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import make_encoder
+from sim_backend.injection import HEALTHY
 from sim_backend.pacer import Pacer
 from sim_backend.plant import make_plant
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from sim_backend.faults.injector import Injector
+    from sim_backend.injection import PlantFaults
 
 
 class SimBackend:
@@ -32,17 +33,19 @@ class SimBackend:
         Its `[sim]`, `[model]`, `[encoder]`, `[amplifier]` and `[loop]` tables are used.
     clock
         What to sleep on.
+    faults
+        What goes wrong with plant and encoder.
     """
 
     simulated = True
 
-    def __init__(self, rig: Rig, clock: Clock) -> None:
+    def __init__(self, rig: Rig, clock: Clock, faults: PlantFaults = HEALTHY) -> None:
         self._pace = Pacer(clock, rig.period)
         self._period = rig.period
         self._skips = rig.timing.overrun == "skip"
         self._tick = 0
-        self._plant = make_plant(rig)
-        self._encoder = make_encoder(rig)
+        self._plant = faults.plant(make_plant(rig))
+        self._encoder = faults.encoder(make_encoder(rig))
         self._amplifier = Amplifier(
             limit=rig.amplifier.limit,
             slew=rig.amplifier.slew * rig.period,
@@ -51,16 +54,11 @@ class SimBackend:
             delay_samples=rig.loop.delay_samples,
         )
         self._truth = Truth(rig.sim.position_rad, 0.0, math.nan)
-        self._faults: Injector | None = getattr(rig.backend, "injection", None)
-        if self._faults:
-            self._plant, self._encoder = self._faults.attach_plain(self._plant, self._encoder, clock)
 
     def __enter__(self) -> Self:
         """Switch the amplifier on, at 0 V."""
         self._amplifier.live = True
         self._pace.start()
-        if self._faults:
-            self._faults.opened()
         return self
 
     def __exit__(
@@ -89,8 +87,7 @@ class SimBackend:
                 voltage, tick = self._skip_to_newest(voltage, tick)
         self._tick = tick + 1
         self._pace.wait_for(tick)
-        sample = Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
-        return sample if self._faults is None else self._faults.sample(sample)
+        return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
 
     def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
         """Let the periods pass that are due already; return the voltage of the last one, V, and its tick."""
@@ -102,8 +99,6 @@ class SimBackend:
 
     def write(self, voltage: float) -> None:
         """Hand a voltage to the amplifier, V."""
-        if self._faults:
-            self._faults.listener.wrote(voltage)
         self._amplifier.command(voltage)
 
     def truth(self) -> Truth:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 from dcmp_hil.backends.kinds import KINDS
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.fault_injection import Faults
     from dcmp_hil.values import Sample, Truth
 
 
@@ -48,8 +50,17 @@ class Backend(Protocol):
         ...
 
 
-def open_backend(rig: Rig, clock: Clock) -> Backend:
+def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS) -> Backend:
     """Find the backend that `rig.backend.kind` names and make it; enter it to open the device.
+
+    Parameters
+    ----------
+    rig
+        Its `[backend]` says which.
+    clock
+        What paces a simulation, and measures how long a device takes.
+    faults
+        What goes wrong on purpose.
 
     Raises
     ------
@@ -57,10 +68,10 @@ def open_backend(rig: Rig, clock: Clock) -> Backend:
         If there is none by that name, or it is a real device and the rig or the clock is not for one.
     """
     kind = rig.backend.kind
-    factory: Callable[[Rig, Clock], Backend] = find_named(KINDS.get(kind, kind), "backend.kind", KINDS)
+    factory: Callable[..., Backend] = find_named(KINDS.get(kind, kind), "backend.kind", KINDS)
     if not getattr(factory, "simulated", False):
         _refuse_simulation_only(rig, clock)
-    return factory(rig, clock)
+    return faults.backend(factory, rig, clock)
 
 
 def _refuse_simulation_only(rig: Rig, clock: Clock) -> None:

@@ -17,7 +17,7 @@ from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import TripError
-from dcmp_hil.plugins import find_named
+from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
-_FAULTS, _WIRED = "sim_backend.faults.plan:with_faults", "sim_backend.faults.plan:needs_wire"
 _BOARD = "backend.kind=sim-board"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 
@@ -56,22 +56,16 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     rig = load_rig(rig_name, overrides)
     for sentence in warnings(rig):
         console.warn(sentence)
-    if options.faults:
-        rig = _with_faults(rig, rig_name, overrides, options.faults)
-    # From here on stops are heard: opening a viewer takes its time, too.
-    with StopRequest() as stop, watched(_viewer(options)) as (viewer, port):
-        return _run(rig, replace(options, viewer=viewer, port=port), stop)
-
-
-def _with_faults(rig: Rig, rig_name: str, overrides: Sequence[str], faults: tuple[str, ...]) -> Rig:
-    if rig.backend.kind == "sim" and find_named(_WIRED, "--fault")(faults):
+    if rig.backend.kind == "sim" and needs_wire(options.faults):
         console.warn(f"backend.kind = sim has no wire, and a fault needs one: this run has {_BOARD}.")
         rig = load_rig(rig_name, [*overrides, _BOARD])
-    made: Rig = find_named(_FAULTS, "--fault")(rig, faults)
-    return made
+    faults = inject(rig, options.faults, "--fault")
+    # From here on stops are heard: opening a viewer takes its time, too.
+    with StopRequest() as stop, watched(_viewer(options)) as (viewer, port):
+        return _run(rig, faults, replace(options, viewer=viewer, port=port), stop)
 
 
-def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
+def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
     folder = RunFolder(rig.name) if options.keep else None
     length = rig.run.duration_s if options.duration is None else options.duration
     session = Session(
@@ -84,6 +78,7 @@ def _run(rig: Rig, options: Options, stop: StopRequest) -> int:
         stop=stop,
         warn=console.warn,
         control=_control(options),
+        faults=faults,
     )
     ended_by = "duration"
     trip: TripError | None = None

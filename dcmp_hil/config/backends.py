@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -22,20 +22,13 @@ class Capacity(NamedTuple):
     bits_per_period: int
 
 
-class Sim(Section):
-    """The simulated rig, without a wire."""
+class Traits:
+    """What a kind of backend is, for whoever must know it: rules, warnings, fault plans, the dashboard."""
 
-    kind: Literal["sim"] = "sim"
-    """The simulated rig: plant, encoder and amplifier behind read and write."""
-
-
-class Device(Section):
-    """What every device on the wire is told."""
-
-    node: Annotated[int, Field(ge=0, le=15)] = 0
-    """Number of the device on a shared bus."""
-    watchdog_ms: Annotated[int, Field(ge=5, le=50)] = 20
-    """The device goes to 0 V when it hears nothing valid for so long, ms."""
+    simulated: ClassVar[bool] = False
+    """Whether the plant is that of [sim]; of a module:Factory it is not known before it is made."""
+    device: ClassVar[bool] = False
+    """Whether it is a device that speaks the project's protocol."""
 
     @property
     def capacity(self) -> Capacity | None:
@@ -43,9 +36,28 @@ class Device(Section):
         return None
 
 
+class Sim(Traits, Section):
+    """The simulated rig, without a wire."""
+
+    simulated: ClassVar[bool] = True
+    kind: Literal["sim"] = "sim"
+    """The simulated rig: plant, encoder and amplifier behind read and write."""
+
+
+class Device(Traits, Section):
+    """What every device on the wire is told."""
+
+    device: ClassVar[bool] = True
+    node: Annotated[int, Field(ge=0, le=15)] = 0
+    """Number of the device on a shared bus."""
+    watchdog_ms: Annotated[int, Field(ge=5, le=50)] = 20
+    """The device goes to 0 V when it hears nothing valid for so long, ms."""
+
+
 class SimBoard(Device):
     """The firmware's own C in this process, the simulated plant on its pins, real bytes in between."""
 
+    simulated: ClassVar[bool] = True
     kind: Literal["sim-board"]
     """The firmware's core compiled for this computer; needs a C compiler."""
     carrier: Literal["cobs", "slcan", "can"] = "cobs"
@@ -94,5 +106,5 @@ class Can(Device):
         return Capacity("bitrate", self.bitrate, _PAIR_CAN)
 
 
-class CustomBackend(Custom):
+class CustomBackend(Traits, Custom):
     """A backend of your own: `kind = "module:Factory"`, made as Factory(rig, clock)."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.backends import Can, Serial, Sim, SimBoard
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
 from dcmp_hil.config.words import toml_value
@@ -37,7 +36,7 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         if hasattr(value, "model_fields_set"):
-            if prefix or name != "sim" or simulated(rig):
+            if prefix or name != "sim" or rig.backend.simulated:
                 rows += _rows(value, f"{prefix}{name}.", rig)
             continue
         if prefix == "sim.plant." and name not in section.model_fields_set:
@@ -48,11 +47,6 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
             continue
         rows.append((f"{prefix}{name}", _by_rule(name, rig) if value is None else toml_value(value), meaning))
     return rows
-
-
-def simulated(rig: Rig) -> bool:
-    """Whether [sim] matters: a plant of one's own may or may not look at it."""
-    return isinstance(rig.backend, Sim | SimBoard)
 
 
 def _kinds(prefix: str, name: str) -> str:
@@ -116,7 +110,7 @@ def _immediate(rig: Rig) -> str:
 def _probe(rig: Rig) -> str:
     if rig.supervisor.probe == "first" and rig.supervisor.start == "engage":
         return _coarse(rig)
-    if rig.supervisor.probe == "first" or not isinstance(rig.backend, Serial | Can):
+    if rig.supervisor.probe == "first" or rig.backend.simulated:
         return ""
     return 'supervisor.probe = "off": a motor or encoder wired the wrong way is found by running away.'
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.backends import Device, Sim, SimBoard
-from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.config.words import number
 from dcmp_hil.observers.super_twisting import bandwidth_floor
@@ -58,9 +56,9 @@ def _floor_below_rate(rig: Rig) -> str:
 
 def _simulation_only(rig: Rig) -> str:
     kind = rig.backend.kind
-    if isinstance(rig.backend, Custom | Sim):
+    if not rig.backend.device:
         return ""  # a module:Factory says for itself whether it is a simulation, when it is opened
-    loose = rig.impossible_on_a_wire if isinstance(rig.backend, SimBoard) else rig.simulation_only
+    loose = rig.impossible_on_a_wire if rig.backend.simulated else rig.simulation_only
     if not loose:
         return ""
     return (
@@ -71,7 +69,7 @@ def _simulation_only(rig: Rig) -> str:
 
 def _whole_units(rig: Rig) -> str:
     """Refuse what a device cannot say in whole numbers."""
-    if not isinstance(rig.backend, Device):
+    if not rig.backend.device:
         return ""
     faults = []
     period_us, counts = rig.period * 1e6, rig.encoder.counts
@@ -89,7 +87,7 @@ def _whole_units(rig: Rig) -> str:
 
 
 def _link_carries_rate(rig: Rig) -> str:
-    capacity = rig.backend.capacity if isinstance(rig.backend, Device) else None
+    capacity = rig.backend.capacity
     if capacity is None or capacity.bits_per_period * rig.loop.rate_hz <= capacity.bits_per_second:
         return ""
     most = capacity.bits_per_second / capacity.bits_per_period

@@ -11,7 +11,6 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config import load_table
 from dcmp_hil.live.control import Setup
 from dcmp_hil.live.mailbox import SIZE, Mailbox
 from dcmp_hil.telemetry.shared import mapped, reserve
@@ -56,8 +55,7 @@ class ControlProcess:
         if ring is None:
             return
         self._warn = warn
-        plain = load_table(rig.model_dump(exclude_unset=True))  # without what a simulation put into it
-        os.write(self._setup, pickle.dumps(Setup(plain, self._file, ring)))
+        os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring)))
         self._line, theirs = socket.socketpair()
         with theirs:
             code = _CODE.format(path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid())

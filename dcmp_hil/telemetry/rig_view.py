@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.explain import explain, simulated
+from dcmp_hil.config.explain import explain
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.host import host_facts
 from dcmp_hil.model import UNKNOWN_MODEL
@@ -68,10 +68,10 @@ def view_of(rig: Rig) -> RigView:
         name=rig.name,
         parameters=tuple(sorted(rows, key=_place)),
         voltage_limit=limit if math.isfinite(limit) else None,
-        simulated=simulated(rig),
+        simulated=rig.backend.simulated,
         period=rig.period,
         model=rig.model.values(),
-        wired=rig.backend.kind != "sim",
+        wired=rig.backend.device or not rig.backend.simulated,
         about=_about(),
         kinds=_kinds(),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.config.backends import SimBoard
@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from dcmp_hil.values import Sample, Truth
+    from dcmp_hil.values import Truth
     from dcmp_hil.wire.frame import Frame
-    from sim_backend.faults.injector import Injector
 
 _CARRIERS = {"cobs": cobs, "slcan": slcan}
 
@@ -37,38 +36,24 @@ class SimBoardBackend(DeviceBackend):
         What paces the board.
     board
         One made already; by default a new one.
+    link
+        Makes the line to the board; by default one without faults.
     """
 
     simulated = True
 
-    def __init__(self, rig: Rig, clock: Clock, board: Board | None = None) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        clock: Clock,
+        board: Board | None = None,
+        link: Callable[[Board, str, Pacer], BoardLink] | None = None,
+    ) -> None:
         if not isinstance(rig.backend, SimBoard):
             raise ConfigError(f'backend.kind: got "{rig.backend.kind}"; expected "sim-board".')
-        carrier, pace = rig.backend.carrier, Pacer(clock, rig.period)
-        self._faults: Injector | None = getattr(rig.backend, "injection", None)
-        faults, there = self._faults, board or getattr(rig.backend, "injection_board", None)
-        arguments = faults.board_arguments() if faults else {}
-        self.board: Board = there or Board(rig, carrier=carrier, **arguments)
-        make = faults.attach if faults else BoardLink
-        super().__init__(rig, make(self.board, carrier, pace), clock)
-
-    def __enter__(self) -> Self:
-        """Open it as any device; faults count their time from here."""
-        super().__enter__()
-        if self._faults:
-            self._faults.opened()
-        return self
-
-    def read(self) -> Sample:
-        """Wait for the next SAMPLE and return the newest, if nothing goes wrong."""
-        sample = super().read()
-        return self._faults.sample(sample) if self._faults else sample
-
-    def write(self, voltage: float) -> None:
-        """Send a voltage, V; a number that is not finite is sent as 0 V."""
-        if self._faults:
-            self._faults.listener.wrote(voltage)
-        super().write(voltage)
+        carrier, pacer = rig.backend.carrier, Pacer(clock, rig.period)
+        self.board = board or Board(rig, carrier=carrier)
+        super().__init__(rig, (link or BoardLink)(self.board, carrier, pacer), clock)
 
     def truth(self) -> Truth:
         """Return the true state at the last sample."""

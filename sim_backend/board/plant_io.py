@@ -12,7 +12,7 @@ from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from sim_backend.faults.injector import Injector
+    from sim_backend.injection import PlantFaults
 
 _WORD = 0xFFFF_FFFF
 
@@ -46,7 +46,7 @@ class PlantIO:
             voltage = self._stage.step()
         self.truth = self._plant.advance(voltage)
 
-    def inject(self, faults: Injector) -> None:
+    def inject(self, faults: PlantFaults) -> None:
         """Let faults come between the pins and the plant, instead of earlier ones."""
         plant, encoder = self._healthy
         self._plant, self._encoder = faults.plant(plant), faults.encoder(encoder)

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Mapping
 
+    from dcmp_hil.values import Truth
     from sim_backend.board.board import Board
 
 Value = float | str
@@ -41,10 +42,19 @@ class Choice:
     words: tuple[str, ...]
 
 
+class FaultContext(NamedTuple):
+    """What a function that decides when a fault begins may look at."""
+
+    tick: int  # periods since the backend was opened
+    t: float  # s, the same
+    truth: Truth  # of the plant
+
+
 class RigFacts(NamedTuple):
     """What faults may know of the rig that they are injected into."""
 
     carrier: str  # `cobs`, `slcan` or `can`; empty where there is no wire
+    wired: bool  # whether a board stands between host and plant
     period: float  # s
     ku: float  # (rad/s2)/V, of the plant
     believed_ku: float  # the same, of [model]

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from sim_backend.board.backend import BoardLink
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
     from sim_backend.board.board import Board
-    from sim_backend.faults.injector import Injector
+    from sim_backend.faults.listener import FaultListener
+    from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
 
 _ENDS = {"cobs": b"\0", "slcan": b"\r"}
 _HIGHEST, _LONGEST = 0x7FF, 8
+
+
+class LineFaults(Protocol):
+    """What goes wrong on a line, and the time of the faults, which is that of the board."""
+
+    listener: FaultListener
+
+    def tick(self) -> None:
+        """Let a period begin."""
+        ...
+
+    def passed(self, piece: bytes, way: Way) -> list[bytes]:
+        """Return what arrives at once of a piece."""
+        ...
+
+    def released(self, way: Way) -> list[bytes]:
+        """Return what arrives now of earlier pieces."""
+        ...
 
 
 class FaultyLink(BoardLink):
@@ -23,13 +42,13 @@ class FaultyLink(BoardLink):
     ----------
     board, carrier, pace
         As for BoardLink.
-    injection
+    faults
         What goes wrong.
     """
 
-    def __init__(self, board: Board, carrier: str, pace: Pacer, injection: Injector) -> None:
+    def __init__(self, board: Board, carrier: str, pace: Pacer, faults: LineFaults) -> None:
         super().__init__(board, carrier, pace)
-        self._injection = injection
+        self._faults = faults
         self._end = _ENDS.get(carrier)
         self._rest = b""
 
@@ -37,7 +56,7 @@ class FaultyLink(BoardLink):
         """Hand a frame, or what is left of it, to the board."""
         number, data = frame
         piece = number.to_bytes(2, "little") + data if self._encode is None else self._encode(frame)
-        for arriving in self._injection.passed(piece, "up"):
+        for arriving in self._faults.passed(piece, "up"):
             self._deliver(arriving)
 
     def elapse(self, periods: int) -> None:
@@ -47,21 +66,21 @@ class FaultyLink(BoardLink):
             self._fetch()
 
     def _let_tick(self) -> None:
-        injection = self._injection
-        injection.tick()
-        for piece in injection.released("up"):
+        faults = self._faults
+        faults.tick()
+        for piece in faults.released("up"):
             self._deliver(piece)
         super()._let_tick()
 
     def _fetch(self) -> None:
-        injection = self._injection
+        faults = self._faults
         pieces = self._sent()
         for piece in pieces:
-            injection.listener.said(piece)
-        arriving = [end for piece in pieces for end in injection.passed(piece, "down")]
-        for piece in injection.released("down") + arriving:
+            faults.listener.said(piece)
+        arriving = [end for piece in pieces for end in faults.passed(piece, "down")]
+        for piece in faults.released("down") + arriving:
             self._take(piece)
-        injection.listener.fetched()
+        faults.listener.fetched()
 
     def _sent(self) -> list[bytes]:
         if self._end is None:
@@ -70,7 +89,7 @@ class FaultyLink(BoardLink):
         return [piece + self._end for piece in pieces]
 
     def _deliver(self, piece: bytes) -> None:
-        self._injection.listener.heard(piece)
+        self._faults.listener.heard(piece)
         if self._receiver is not None:
             self._board.receive(piece)
         else:

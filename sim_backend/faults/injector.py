@@ -4,53 +4,31 @@ from __future__ import annotations
 
 import math
 import random
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.values import UNKNOWN_TRUTH
+from sim_backend.board.board import Board
+from sim_backend.faults.base import FaultContext
 from sim_backend.faults.faulty_link import FaultyLink
 from sim_backend.faults.firmware import Start
 from sim_backend.faults.host import HostFault
+from sim_backend.faults.listener import FaultListener
 from sim_backend.faults.plant import FaultyEncoder, FaultyPlant, PlantFault
+from sim_backend.faults.stages import FaultyBackend, FaultyController, FaultyObserver
 from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.clock import Clock
+    from dcmp_hil.config import Rig
     from dcmp_hil.values import Estimate, Sample, Truth
-    from sim_backend.board.board import Board
     from sim_backend.encoder import Encoder
     from sim_backend.faults.base import FaultModel, RigFacts
-    from sim_backend.faults.plan import Fault
+    from sim_backend.faults.fault import Fault
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
     from sim_backend.plant import Plant
-
-
-class FaultContext(NamedTuple):
-    """What a predicate may look at."""
-
-    tick: int  # periods since the backend was opened
-    t: float  # s, the same
-    truth: Truth  # of the plant
-
-
-class FaultListener:
-    """Sees everything that passes; by default it does not look."""
-
-    def attached(self, board: Board | None) -> None:
-        """Meet the board; None on the plain simulated rig."""
-
-    def heard(self, piece: bytes) -> None:
-        """See what reaches the board."""
-
-    def said(self, piece: bytes) -> None:
-        """See what the board sends, before the wire has it."""
-
-    def fetched(self) -> None:
-        """See the board after its tick."""
-
-    def wrote(self, voltage: float) -> None:
-        """See what the host's loop hands to its backend, V."""
 
 
 class Timer:
@@ -93,7 +71,7 @@ def _ticks(time: float | str, period: float) -> float:
 
 
 class Injector:
-    """A plan at work on one backend.
+    """A plan at work in one run: everything of the rig that can go wrong, with its faults around it.
 
     Parameters
     ----------
@@ -105,18 +83,27 @@ class Injector:
         Of the rig.
     listener
         Told of what passes.
+    board
+        One that is there already; None makes a new one where there is a wire.
     """
 
-    def __init__(self, faults: Sequence[Fault], seed: int, facts: RigFacts, listener: FaultListener) -> None:
-        self.listener = listener
-        self.board: Board | None = None
+    def __init__(
+        self,
+        faults: Sequence[Fault],
+        seed: int,
+        facts: RigFacts,
+        listener: FaultListener | None = None,
+        board: Board | None = None,
+    ) -> None:
+        self.listener = listener or FaultListener()
+        self.board = board
         self.timers: list[Timer] = []
         self._facts = facts
         self._boot: Start | None = None
         self._tick = 0
         self._open = False
         self._first_began: int | None = None
-        self._truth: Callable[[], Truth]
+        self._truth: Callable[[], Truth] = lambda: UNKNOWN_TRUTH
         for place, fault in enumerate(faults):
             rng = random.Random(f"{seed} {place} {fault.kind}")  # noqa: S311 - it must repeat itself
             effect = fault.make(facts, rng)
@@ -128,7 +115,27 @@ class Injector:
         self._plant = [effect for effect in effects if isinstance(effect, PlantFault)]
         self._host = [effect for effect in effects if isinstance(effect, HostFault)]
 
-    def board_arguments(self) -> dict[str, int]:
+    def backend(self, factory: Callable[..., Any], rig: Rig, clock: Clock) -> FaultyBackend:
+        """Make a simulated backend, with its faults between the plant and the loop."""
+        if self._facts.wired:
+            board = self.board or Board(rig, carrier=self._facts.carrier, **self._start())
+            return FaultyBackend(factory(rig, clock, board=board, link=self.attach), self)
+        backend = FaultyBackend(factory(rig, clock, faults=self), self)
+        for effect in self._host:
+            effect.elapse = lambda seconds: clock.sleep_until_ns(clock.now_ns() + round(1e9 * seconds))
+        self.listener.attached(None)
+        self._look()
+        return backend
+
+    def observer(self, observer: Any) -> FaultyObserver:
+        """Return an observer as it is with these faults."""
+        return FaultyObserver(observer, self)
+
+    def controller(self, controller: Any) -> FaultyController:
+        """Return a controller as it is with these faults."""
+        return FaultyController(controller, self)
+
+    def _start(self) -> dict[str, int]:
         """Return how a board is to boot."""
         start = self._boot
         if start is None:
@@ -139,31 +146,25 @@ class Injector:
             "count_offset": round(start.number("count")),
         }
 
-    def attach(self, board: Board, carrier: str, pace: Pacer) -> FaultyLink:
+    def attach(self, board: Board, carrier: str, pacer: Pacer) -> FaultyLink:
         """Take hold of a board; return the line to it."""
         self.board = board
         board.pins.inject(self)
         self._truth = board.truth
-        link = FaultyLink(board, carrier, pace, self)
+        link = FaultyLink(board, carrier, pacer, self)
         for effect in self._host:
             effect.elapse = lambda seconds: link.elapse(round(seconds / self._facts.period))
         self.listener.attached(board)
         self._look()
         return link
 
-    def attach_plain(self, plant: Plant, encoder: Encoder, clock: Clock) -> tuple[Plant, Encoder]:
-        """Take hold of a plain simulated rig, where time that passes is the clock's alone."""
-        for effect in self._host:
-            effect.elapse = lambda seconds: clock.sleep_until_ns(clock.now_ns() + round(1e9 * seconds))
+    def plant(self, plant: Plant) -> Plant:
+        """Return a plant as it is with these faults; without a board its time is that of the faults."""
+        if self._facts.wired:
+            return FaultyPlant(plant, self, ticking=False)
         faulty = FaultyPlant(plant, self, ticking=True)
         self._truth = lambda: faulty.truth
-        self.listener.attached(None)
-        self._look()
-        return faulty, self.encoder(encoder)
-
-    def plant(self, plant: Plant) -> Plant:
-        """Return a plant as it is with these faults."""
-        return FaultyPlant(plant, self, ticking=False)
+        return faulty
 
     def encoder(self, encoder: Encoder) -> Encoder:
         """Return an encoder as it is with these faults."""
@@ -171,7 +172,7 @@ class Injector:
 
     def opened(self) -> None:
         """Call the first sample, which the host is about to read, that of tick 0."""
-        self._tick, self._open = 0 if self.board is None else -1, True  # a board ticks first
+        self._tick, self._open = -1 if self._facts.wired else 0, True  # a board ticks first
 
     def tick(self) -> None:
         """Let a period begin."""

@@ -18,13 +18,15 @@ from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from dcmp_hil.wire.messages import State
 from sim_backend.board.board import Board
-from sim_backend.faults.plan import Fault, FaultPlan
+from sim_backend.faults.fault import Fault
+from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dcmp_hil.config import Rig
+    from sim_backend.faults.injector import Injector
     from tests.faults.rows import Row
 
 _WHOLE = ((1.3, 1.6), 2.3)  # s: when the fault comes, and the end of the run
@@ -62,11 +64,11 @@ class Bench(NamedTuple):
 def judge(row: Row, seed: int, *, rearm: bool = False, make: type[Board] = Board) -> Verdict:
     """Run a row with a seed, and judge it; on request start again afterwards, without the fault."""
     bench = prepare(row, seed, make)
-    rig = bench.plan.on(bench.rig, bench.oracle, bench.board)
+    injector = bench.plan.on(bench.rig, bench.oracle, bench.board)
     with same_session(seed):
-        session = Session(rig, duration=bench.length, fast=True)
+        session = Session(bench.rig, duration=bench.length, fast=True, faults=injector)
         outcome = outcome_of(session)
-        verdict = _verdict(bench, row, rig, session, outcome)
+        verdict = _verdict(bench, row, injector, session, outcome)
         if rearm and row.rearms:
             return verdict._replace(violations=verdict.violations + start_again(bench, seed))
     return verdict
@@ -75,7 +77,8 @@ def judge(row: Row, seed: int, *, rearm: bool = False, make: type[Board] = Board
 def judge_plain(row: Row, seed: int) -> Verdict:
     """Do the same on the plain simulated rig, as far as there is something to judge."""
     bench = prepare(row, seed, Board, "backend.kind=sim")
-    session = Session(bench.plan.on(bench.rig, bench.oracle), duration=bench.length, fast=True)
+    injector = bench.plan.on(bench.rig, bench.oracle)
+    session = Session(bench.rig, duration=bench.length, fast=True, faults=injector)
     outcome = outcome_of(session)
     columns, at = session.result().columns, bench.plan.faults[0].at
     begins = at if isinstance(at, float) else 0.0
@@ -136,11 +139,11 @@ def outcome_of(session: Session) -> str:
     return "completed"
 
 
-def _verdict(bench: Bench, row: Row, rig: Rig, session: Session, outcome: str) -> Verdict:
+def _verdict(bench: Bench, row: Row, injector: Injector, session: Session, outcome: str) -> Verdict:
     board, oracle = bench.board, bench.oracle
     goes_on = row.bound_ms is None
     _alone(bench, _AFTERWARDS)
-    reaction = math.nan if goes_on else _reaction(bench, rig)
+    reaction = math.nan if goes_on else _reaction(bench, injector)
     found = [*oracle.violations]
     if not goes_on and not reaction <= (row.bound_ms or 0.0):
         found.append(f"0 V after {reaction:.1f} ms; the bound is {row.bound_ms}")
@@ -155,13 +158,13 @@ def _verdict(bench: Bench, row: Row, rig: Rig, session: Session, outcome: str) -
     return Verdict(outcome, outcome in row.right, reaction, tuple(found))
 
 
-def _reaction(bench: Bench, rig: Rig) -> float:
+def _reaction(bench: Bench, injector: Injector) -> float:
     """Return how long it was to 0 V, ms; 0 if the amplifier was off already."""
-    began = rig.backend.injection.first_began  # type: ignore[union-attr]
+    began = injector.first_began
     off = bench.oracle.off_at
     if began is None or not bench.oracle.ran:
         return 0.0
-    return math.inf if off is None else max(0.0, 1e3 * rig.period * (off - began))
+    return math.inf if off is None else max(0.0, 1e3 * bench.rig.period * (off - began))
 
 
 def _alone(bench: Bench, ticks: int) -> int:
@@ -187,7 +190,9 @@ def start_again(bench: Bench, seed: int) -> tuple[str, ...]:
     board, oracle = bench.board, bench.oracle
     board.link(up=True)
     healthy = FaultPlan(seed=seed).on(bench.again, oracle, board)
-    session = Session(healthy, duration=_FOLLOWS_WITHIN, fast=True)  # from here on the plant is well
+    session = Session(
+        bench.again, duration=_FOLLOWS_WITHIN, fast=True, faults=healthy
+    )  # from here on the plant is well
     before = len(oracle.violations)
     _alone(bench, _LEASE)
     for _ in range(_PATIENCE):

@@ -37,6 +37,6 @@ def healthy(seed: int) -> Verdict:
         ),
     )
     oracle = Oracle()
-    made = FaultPlan(seed=seed).on(rig, oracle, Board(rig, carrier="cobs"))
-    outcome = outcome_of(Session(made, duration=LENGTH, fast=True))
+    injector = FaultPlan(seed=seed).on(rig, oracle, Board(rig, carrier="cobs"))
+    outcome = outcome_of(Session(rig, duration=LENGTH, fast=True, faults=injector))
     return Verdict(outcome, outcome == "completed", float("nan"), tuple(oracle.violations))

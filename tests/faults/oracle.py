@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import CorruptFrameError, unpack
 from dcmp_hil.wire.messages import Drive, SampleReport, State
-from sim_backend.faults.injector import FaultListener
+from sim_backend.faults.listener import FaultListener
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.messages import Message

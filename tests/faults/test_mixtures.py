@@ -12,7 +12,8 @@ from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from sim_backend.board.board import Board
 from sim_backend.faults.base import Choice
-from sim_backend.faults.plan import KINDS, Fault, FaultPlan
+from sim_backend.faults.fault import KINDS, Fault
+from sim_backend.faults.plan import FaultPlan
 from tests.faults.matrix import outcome_of, same_session
 from tests.faults.oracle import Oracle
 from tests.helpers import bench
@@ -47,9 +48,9 @@ def mixed(seed: int) -> tuple[str, list[str], list[str]]:
     faults = [drawn(luck) for _ in range(luck.randrange(1, 5))]
     rig = bench("backend.kind=sim-board", "supervisor.start=immediate")
     oracle = Oracle()
-    made = FaultPlan(faults, seed).on(rig, oracle, Board(rig))
+    injector = FaultPlan(faults, seed).on(rig, oracle, Board(rig))
     with same_session(seed):
-        outcome = outcome_of(Session(made, duration=LENGTH, fast=True))
+        outcome = outcome_of(Session(rig, duration=LENGTH, fast=True, faults=injector))
     return (
         outcome,
         oracle.violations,

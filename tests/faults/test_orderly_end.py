@@ -10,7 +10,8 @@ from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.wire.messages import State
 from sim_backend.board.board import Board
-from sim_backend.faults.plan import Fault, FaultPlan
+from sim_backend.faults.fault import Fault
+from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 
 pytestmark = pytest.mark.usefixtures("untraced")
@@ -22,7 +23,7 @@ def _run(*overrides: str, fault: str = "") -> tuple[Session, Board, Exception]:
     rig = load_rig("bench-1khz", (*_RIG, *overrides))
     board, oracle = Board(rig, carrier="cobs"), Oracle()
     plan = FaultPlan([Fault.of(fault)] if fault else [])
-    session = Session(plan.on(rig, oracle, board), duration=6.0, fast=True)
+    session = Session(rig, duration=6.0, fast=True, faults=plan.on(rig, oracle, board))
     with pytest.raises((TripError, DeadlineError)) as caught:
         session.run()
     assert not oracle.violations

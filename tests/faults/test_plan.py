@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import secrets
 from typing import TYPE_CHECKING
 
@@ -13,16 +14,17 @@ from dcmp_hil import run
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.session import Session
 from sim_backend.faults.base import Number
+from sim_backend.faults.fault import KINDS, Fault
+from sim_backend.faults.host import InjectedError
 from sim_backend.faults.parser import WrongFaultError
-from sim_backend.faults.plan import KINDS, Fault, FaultPlan, with_faults
+from sim_backend.faults.plan import FaultPlan, inject
 from tests.faults.matrix import judge, outcome_of
 from tests.faults.rows import ROWS, SILENT, Row
 from tests.helpers import bench
 
 if TYPE_CHECKING:
-    from dcmp_hil.config import Rig
     from dcmp_hil.session import Result
-    from sim_backend.faults.injector import FaultContext
+    from sim_backend.faults.base import FaultContext
 
 BOARD = "backend.kind=sim-board"
 QUICK = "supervisor.start=immediate"
@@ -34,12 +36,8 @@ def same_host(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(secrets, "randbelow", lambda below: below // 2)
 
 
-def on(rig: Rig, *texts: str, seed: int = 1) -> Rig:
-    return FaultPlan([Fault.of(text) for text in texts], seed).on(rig)
-
-
 def quick(*faults: Fault, backend: str = BOARD, duration: float = 0.2, seed: int = 1) -> Result:
-    return run(FaultPlan(faults, seed).on(bench(backend, QUICK)), duration=duration, fast=True)
+    return run(bench(backend, QUICK, f"sim.seed={seed}"), duration=duration, fast=True, faults=faults)
 
 
 def lost_at(result: Result) -> list[int]:
@@ -94,31 +92,50 @@ def test_text_says_what_the_constructor_says() -> None:
 )
 def test_wrong_text_is_refused_with_a_remedy(text: str, says: str) -> None:
     with pytest.raises(ConfigError, match=r"^--fault") as caught:
-        with_faults(bench(BOARD), [text])
+        inject(bench(BOARD), [text], "--fault")
     assert says in str(caught.value)
 
 
 def test_every_wrong_fault_is_named_at_once() -> None:
     with pytest.raises(ConfigError) as caught:
-        with_faults(bench(BOARD), ["wire.drp", "wire.drop:q=1,p=2", "plant.power"])
+        inject(bench(BOARD), ["wire.drp", "wire.drop:q=1,p=2", "plant.power"])
     assert len(caught.value.faults) == 3
 
 
 def test_faults_are_refused_where_they_cannot_happen() -> None:
     with pytest.raises(ConfigError, match="has no wire") as caught:
-        with_faults(bench(), ["wire.drop", "firmware.reset", "plant.power"])
+        inject(bench(), ["wire.drop", "firmware.reset", "plant.power"])
     assert len(caught.value.faults) == 2
     real = bench("backend.kind=serial", "backend.port=/dev/ttyACM0")
-    with pytest.raises(ConfigError, match="faults are for simulated rigs"):
-        with_faults(real, ["plant.power"])
-    own = bench("controller.kind=tests.helpers:known")
-    with pytest.raises(ConfigError, match="expected a shipped one"):
-        with_faults(own, ["host.raise"])
+    with pytest.raises(ConfigError, match="faults are for the simulated rigs"):
+        inject(real, ["plant.power"])
+    with pytest.raises(ConfigError, match="faults are for the simulated rigs"):
+        inject(bench("backend.kind=tests.helpers:LosesSamples"), ["plant.power"])
 
 
-def test_a_rig_with_faults_is_written_like_the_rig_without() -> None:
-    rig = bench(BOARD)
-    assert on(rig, "wire.drop", "host.raise").model_dump(mode="json") == rig.model_dump(mode="json")
+def test_faults_of_the_host_act_on_an_observer_of_ones_own() -> None:
+    own = bench("observer.kind=tests.helpers:IgnoresGaps")
+    with pytest.raises(InjectedError, match="injected: observer"):
+        run(own, duration=0.2, fast=True, faults=["host.raise:where=observer,at=0.1s"])
+
+
+def test_a_run_takes_texts_and_objects_together() -> None:
+    push = Fault("plant.shove", at=50, for_=10, rad_s2=100.0)
+    faulty = run(
+        bench(BOARD, QUICK), duration=0.2, fast=True, faults=["wire.drop:p=1,at=100ms,for=2ms", push]
+    )
+    assert lost_at(faulty) == [100, 101]
+    pushed, usual = (result.columns["position_true_rad"] for result in (faulty, quick()))
+    assert pushed[60] != usual[60]
+
+
+def test_a_rig_is_the_same_object_whatever_goes_wrong() -> None:
+    rig = bench(BOARD, QUICK)
+    before = pickle.dumps(rig)
+    session = Session(rig, duration=0.1, fast=True, faults=["host.slow", "wire.drop"])
+    session.run()
+    assert session.rig is rig
+    assert pickle.dumps(rig) == before
 
 
 def test_times_are_ticks_or_seconds_or_a_predicate() -> None:
@@ -150,7 +167,11 @@ def test_a_whole_verdict_repeats_itself() -> None:
 
 def test_a_plan_can_be_used_again() -> None:
     plan = FaultPlan([Fault("wire.drop", p=0.2, way="down")])
-    first, second = (run(plan.on(bench(BOARD, QUICK)), duration=0.2, fast=True) for _ in range(2))
+    rig = bench(BOARD, QUICK)
+    sessions = [Session(rig, duration=0.2, fast=True, faults=plan.on(rig)) for _ in range(2)]
+    for session in sessions:
+        session.run()
+    first, second = (session.result() for session in sessions)
     assert lost_at(first) == lost_at(second) != []
 
 
@@ -162,8 +183,7 @@ def test_wire_faults_do_something_on_every_carrier(carrier: str, kind: str) -> N
     rig = bench(BOARD, QUICK, f"backend.carrier={carrier}")
     healthy = run(rig, duration=0.2, fast=True)
     likely = {"p": 0.3} if "p" in KINDS[kind].params else {}
-    faulty = FaultPlan([Fault(kind, at=50, for_=50, **likely)]).on(rig)
-    session = Session(faulty, duration=0.2, fast=True)
+    session = Session(rig, duration=0.2, fast=True, faults=[Fault(kind, at=50, for_=50, **likely)])
     outcome = outcome_of(session)
     assert outcome in {"completed", *SILENT, "CORRUPT_LINK", "LINK_DOWN"}
     result = session.result()
@@ -174,7 +194,9 @@ def test_wire_faults_do_something_on_every_carrier(carrier: str, kind: str) -> N
 
 def test_every_healthy_run_is_the_same_with_an_empty_plan() -> None:
     plain = run(bench(BOARD), duration=1.0, fast=True)
-    planned = run(FaultPlan().on(bench(BOARD)), duration=1.0, fast=True)
+    session = Session(bench(BOARD), duration=1.0, fast=True, faults=FaultPlan().on(bench(BOARD)))
+    session.run()
+    planned = session.result()
     for name, column in plain.columns.items():
         np.testing.assert_array_equal(column, planned.columns[name], err_msg=name)
 

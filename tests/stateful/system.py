@@ -16,7 +16,8 @@ from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop
 from sim_backend.board.board import Board
-from sim_backend.faults.plan import Fault, FaultPlan
+from sim_backend.faults.fault import Fault
+from sim_backend.faults.plan import FaultPlan
 from sim_backend.pacer import Pacer
 from tests.helpers import bench
 from tests.stateful.host import Host
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.messages import Message
     from sim_backend.faults.base import FaultModel
     from sim_backend.faults.faulty_link import FaultyLink
-    from sim_backend.faults.injector import Injector
 
 FAULTS = {
     "wire.drop": {"p": 1.0, "way": "up"},
@@ -90,12 +90,12 @@ class System:
         )
         self.judge = Judge(first_tick=start.tick, ticked=self._ticked)
         faults = [Fault(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
-        self.rig = FaultPlan(faults, seed).on(rig_at(start.encoder), self.judge, self.board)
-        self._injection: Injector = self.rig.backend.injection  # type: ignore[union-attr]
-        effects = (timer.effect for timer in self._injection.timers)
+        self.rig = rig_at(start.encoder)
+        self._injector = FaultPlan(faults, seed).on(self.rig, self.judge, self.board)
+        effects = (timer.effect for timer in self._injector.timers)
         self._effects: dict[str, FaultModel] = dict(zip(FAULTS, effects, strict=True))
-        ticking = zip(FAULTS, tuple(self._injection.timers), strict=True)
-        self._injection.timers[:] = [timer for kind, timer in ticking if kind in _TICKING]  # for speed
+        ticking = zip(FAULTS, tuple(self._injector.timers), strict=True)
+        self._injector.timers[:] = [timer for kind, timer in ticking if kind in _TICKING]  # for speed
         self._ends: dict[str, int] = {}  # ticks of the board
         self._disturbed = -_QUIET  # tick of the board at which the last fault was on
         self._plug_in()
@@ -232,7 +232,7 @@ class System:
 
     def _plug_in(self) -> FaultyLink:
         pace = Pacer(self.clock, self.rig.period)
-        self._link = self._injection.attach(self.board, "cobs", pace)
+        self._link = self._injector.attach(self.board, "cobs", pace)
         return self._link
 
     def _ticked(self) -> None:

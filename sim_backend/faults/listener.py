@@ -1,0 +1,27 @@
+"""Who is told of what passes between host and board while faults are injected."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sim_backend.board.board import Board
+
+
+class FaultListener:
+    """Told of everything that passes; by default it ignores it."""
+
+    def attached(self, board: Board | None) -> None:
+        """Learn which board it is; None on the plain simulated rig."""
+
+    def heard(self, piece: bytes) -> None:
+        """Learn what reaches the board."""
+
+    def said(self, piece: bytes) -> None:
+        """Learn what the board sends, before the wire has it."""
+
+    def fetched(self) -> None:
+        """Learn that the board's tick is over."""
+
+    def wrote(self, voltage: float) -> None:
+        """Learn what the host's loop gives to its backend, V."""
