@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import FrameType, TracebackType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -24,6 +26,7 @@ class StopRequest:
         self.signal: signal.Signals | None = None  # what asked, if a signal did
         self._before: dict[signal.Signals, object] = {}
         self._entered = 0
+        self._held = False
 
     @property
     def exit_code(self) -> int:
@@ -49,8 +52,17 @@ class StopRequest:
             signal.signal(number, handler)  # type: ignore[arg-type]
         self._before.clear()
 
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let a second SIGINT interrupt nothing for a moment: what is written meanwhile is written wholly."""
+        before, self._held = self._held, True
+        try:
+            yield
+        finally:
+            self._held = before
+
     def _ask(self, number: int, frame: FrameType | None) -> None:
-        if self.requested and number == signal.SIGINT:
+        if self.requested and number == signal.SIGINT and not self._held:
             signal.default_int_handler(number, frame)
         self.requested = True
         self.signal = self.signal or signal.Signals(number)

@@ -20,7 +20,7 @@ from dcmp_hil.realtime import Grant, RealTime
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.figures import Figures
 from dcmp_hil.telemetry.keeper import Keeper
-from dcmp_hil.telemetry.makers import make_all, sorted_out
+from dcmp_hil.telemetry.makers import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics, Summary
 from dcmp_hil.trajectory import LOWERING
 from dcmp_hil.values import Event
@@ -156,10 +156,9 @@ class Session:
         self._apart: Apart | None = None
         self._figures = Figures(statistics, Keeper() if keep_columns else None)
         if fast:
-            here, sentences = make_all(sinks)
-            here = [self._figures, *here]
+            here = [self._figures, *deferred(sinks)]
         else:
-            here, sentences, there = sorted_out(sinks)
+            here, there = sorted_out(sinks)
             model = rig.model.values()
             self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn, model=model)
         self._control = control
@@ -173,8 +172,7 @@ class Session:
             mailbox=mailbox,
             faults=inject(rig, faults) if isinstance(faults, Iterable) else faults,
         )
-        for sentence in sentences:
-            self._recorder.event(Event(0.0, "WARN", sentence))
+        self._deferred = [sink for sink in here if isinstance(sink, Deferred)]
         self._realtime_factor = math.nan
 
     def run(self) -> None:
@@ -224,7 +222,9 @@ class Session:
                 self._figures = self._apart.figures
 
     def _open_telemetry(self) -> AbstractContextManager[None]:
-        """Let the telemetry process come up, before anything is armed and before we are real-time."""
+        """Make the sinks, here and in a process of their own, before anything is armed or real-time."""
+        for sink in self._deferred:
+            sink.make()
         if self._apart:
             self._apart.open()
         if self._control:
@@ -253,6 +253,11 @@ class Session:
         for grant in self._realtime.grants if self._realtime else ():
             said = "granted" if grant.granted else grant.refusal
             self._recorder.event(Event(0.0, "INFO", f"{grant.what}: {said}"))
+
+    @property
+    def began(self) -> bool:
+        """Whether there was a first period."""
+        return bool(self._recorder.recent)
 
     @property
     def telemetry_pid(self) -> int | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ParamSpec
 import typer
 
 from dcmp_hil import __version__
-from dcmp_hil.cli import console
+from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.check import check
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
@@ -94,6 +94,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; every error of this package becomes its message and its exit code."""
+    streams.guard()
     try:
         _call()
     except SystemExit as leaving:
@@ -115,6 +116,3 @@ def _call() -> None:
     except DcmpError as error:
         console.complain(error)
         sys.exit(error.exit_code)
-    except BrokenPipeError:  # whoever read our output went away, like `dcmp-hil rigs | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)

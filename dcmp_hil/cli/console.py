@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
+from dcmp_hil.cli.outputs import write_text
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -35,39 +36,29 @@ def note(sentence: str) -> None:
     err.print(Text(sentence, style="dim"))
 
 
+def as_json(figures: Any) -> str:
+    """Return figures as a JSON document; NaN and infinity become null."""
+    return json.dumps(_plain(figures), indent=2, allow_nan=False) + "\n"
+
+
 def write_json(target: str, figures: Any) -> None:
-    """Write figures as JSON to a file, or to standard output for `-`; NaN and infinity become null.
+    """Write figures as JSON to a file, or to standard output for `-`.
 
     Raises
     ------
     ConfigError
         If the file cannot be written.
     """
-    text = json.dumps(_plain(figures), indent=2, allow_nan=False)
+    text = as_json(figures)
     if target == "-":
-        out.file.write(text + "\n")
+        out.file.write(text)
         out.file.flush()
         return
     try:
-        Path(target).write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(
-            f"--json {target}: {error.strerror or error}. Choose a file you may write."
-        ) from None
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder that may be there already.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"{folder}: {error.strerror or error}. Choose a folder you may write in.") from None
+        write_text(Path(target), text)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigError(f"--json {target}: {reason}. Choose a file you may write.") from None
 
 
 def _plain(value: Any) -> Any:

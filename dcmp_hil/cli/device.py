@@ -62,7 +62,7 @@ def device(
         make(loaded, link=link.value, clock=MonotonicClock(), symlink=symlink) as running,
     ):
         port = str(symlink or running.port)
-        typer.echo(port)  # flushed: whoever waits for it reads a pipe
+        console.out.print(port, highlight=False, markup=False)
         keys = [key.format(port=port) for key in _RUN_WITH[link]]
         console.note(shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
         _keep_running(running, loaded, stop)

@@ -11,6 +11,7 @@ from dcmp_hil.backends.caller import Caller
 from dcmp_hil.backends.discovery import state_in_words
 from dcmp_hil.backends.links import make_link
 from dcmp_hil.cli import console
+from dcmp_hil.cli.streams import output_failed
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.values import Fault
@@ -52,7 +53,7 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
         began_ns = clock.now_ns()
         until_ns = began_ns + 1e9 * duration if duration else math.inf
         with StopRequest() as stop:
-            while not stop.requested and (now_ns := clock.now_ns()) < until_ns:
+            while not (stop.requested or output_failed()) and (now_ns := clock.now_ns()) < until_ns:
                 found = caller.overhear(_LOOK)
                 if found is None:
                     continue

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.cli import console
+from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.status import StatusLine
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 def status_line(period: float) -> Sink:
     """Return the status line of a run whose samples come every `period` (s)."""
+    streams.guard()
     return StatusLine(console.err, period)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.table import Table
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.outputs import json_place, try_places, write_each
 from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording import export
@@ -37,15 +39,13 @@ def write_exports(file: Path, *, csv: Path | None, parquet: Path | None, rrd: Pa
     targets = [(csv, export.to_csv), (parquet, export.to_parquet), (rrd, export.to_rrd)]
     if not any(path for path, _ in targets):
         raise ConfigError("Nothing to write: say --csv FILE, --parquet FILE or --rrd FILE.")
-    source = recording_in(file).resolve()
-    for path, _ in targets:
-        if path is not None and path.resolve() == source:
-            raise ConfigError(f"{path} is the recording itself. Write elsewhere.")
+    try_places({"--csv": csv, "--parquet": parquet, "--rrd": rrd}, {"the recording": recording_in(file)})
     run = _read(file)
-    for path, write in targets:
-        if path is not None:
-            write(run, path)
-            console.note(f"wrote {path}")
+    written, faults = write_each([(path, partial(write, run)) for path, write in targets])
+    for path in written:
+        console.note(f"wrote {path}")
+    if faults:
+        raise ConfigError(*faults)
 
 
 def replay_own(file: Path, overrides: Sequence[str], json_file: str | None) -> None:
@@ -56,15 +56,16 @@ def replay_own(file: Path, overrides: Sequence[str], json_file: str | None) -> N
     ConfigError
         If the recording cannot be read, or an override is none of observer, controller or model.
     """
+    try_places({"--json": json_place(json_file)}, {"the recording": recording_in(file)})
     run = _read(file)
     if not len(run.rows):
         raise ConfigError(f"{run.path}: no period is in it.")
     result = compare(run, run_again(run, _changed(run.rig, overrides)))
-    if json_file != "-":
-        console.out.print(_table(run, overrides, result))
     if json_file is not None:
         figures = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
         console.write_json(json_file, {"identical": result.identical, "rows": result.rows, **figures})
+    if json_file != "-":
+        console.out.print(_table(run, overrides, result))
 
 
 def _read(file: Path) -> RecordedRun:

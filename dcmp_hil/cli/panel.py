@@ -50,7 +50,7 @@ def _serve(port: int, run: int | None, viewer: str) -> None:
     try:
         from dcmp_hil.panel.server import Panel
     except ImportError:
-        raise ConfigError("The panel needs aiohttp: pip install 'dcmp-hil[panel]'") from None
+        raise ConfigError("The panel needs aiohttp: pip install aiohttp") from None
 
     def ready(address: str) -> None:
         console.out.print(f"open {address}", highlight=False, markup=False)

@@ -9,6 +9,7 @@ import typer
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.options import JsonFile
+from dcmp_hil.errors import ConfigError
 
 
 def paper(
@@ -20,20 +21,32 @@ def paper(
 
     Exit code 1 if a corrected figure leaves its tolerance.
     """
+    from dcmp_hil.cli.outputs import json_place, try_folder, try_places, write_each
     from dcmp_hil.cli.paper_view import misprint_table, reproduction_table
     from dcmp_hil.paper import as_json, draw, reproduce
 
+    try_places({"--json": json_place(json_file)})
     if not no_figures:
-        console.make_folder(out)  # a place that cannot be written shows now, not after the runs
+        try_folder("--out", out)
     with console.err.status("running the paper's simulation, as meant and as printed ..."):
         reproduction = reproduce()
-    if json_file is not None:
-        console.write_json(json_file, as_json(reproduction.rows))
-    if json_file != "-":
+    drawn: list[Path] = []
+    jobs = [
+        (json_place(json_file), lambda path: console.write_json(str(path), as_json(reproduction.rows))),
+        (None if no_figures else out, lambda folder: drawn.extend(draw(reproduction, folder))),
+    ]
+    _, faults = write_each(jobs)
+    if json_file == "-":
+        console.write_json("-", as_json(reproduction.rows))
+    else:
         console.out.print(reproduction_table(reproduction))
         console.out.print(misprint_table(reproduction))
-    if not no_figures:
-        for path in draw(reproduction, out):
-            console.note(f"wrote {path}")
-    if not all(row.passed for row in reproduction.rows):
+    for path in drawn:
+        console.note(f"wrote {path}")
+    passed = all(row.passed for row in reproduction.rows)
+    if faults and passed:
+        raise ConfigError(*faults)
+    for sentence in faults:
+        console.warn(sentence)
+    if not passed:
         raise typer.Exit(1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rich.table import Table
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.outputs import json_place, try_places, write_each
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.replay import read_recording, replay, write_csv, write_rrd
 
@@ -44,20 +45,31 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
     """
     csv, rrd = _targets(file, outputs)
     result = replay(read_recording(file, columns), settings)
+    json = json_place(outputs.json)
+    written, faults = write_each(
+        [
+            (csv, lambda path: write_csv(result, path)),
+            (rrd, lambda path: write_rrd(result, path)),
+            (json, lambda path: console.write_json(str(path), result.figures.to_dict())),
+        ]
+    )
+    _show(file, settings, result, outputs)
+    for path in written:
+        if path != json:
+            console.note(f"wrote {path}")
+    if faults:
+        raise ConfigError(*faults)
+
+
+def _show(file: Path, settings: ReplaySettings, result: ReplayResult, outputs: Outputs) -> None:
     for column in result.recording.columns:
         console.note(str(column))
     for sentence in result.notes:
         console.note(sentence)
-    if outputs.json != "-":
+    if outputs.json == "-":
+        console.write_json("-", result.figures.to_dict())
+    else:
         console.out.print(_table(file, settings, result))
-    if outputs.json is not None:
-        console.write_json(outputs.json, result.figures.to_dict())
-    if csv is not None:
-        write_csv(result, csv)
-        console.note(f"wrote {csv}")
-    if rrd is not None:
-        write_rrd(result, rrd)
-        console.note(f"wrote {rrd}")
 
 
 def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
@@ -68,9 +80,8 @@ def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
         target or (default if outputs.by_default else None)
         for target, default in zip(named, defaults, strict=True)
     )
-    for target in (csv, rrd, None if outputs.json in (None, "-") else Path(str(outputs.json))):
-        if target is not None and target.resolve() == file.resolve():
-            raise ConfigError(f"{target} is the recording itself. Write elsewhere: --csv, --rrd, --json.")
+    places = {"--csv": csv, "--rrd": rrd, "--json": json_place(outputs.json)}
+    try_places(places, {"the recording": file})
     return csv, rrd
 
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import csv
+import io
 import shutil
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.outputs import write_text
 from dcmp_hil.clock import utc_now
-from dcmp_hil.errors import ConfigError
+from dcmp_hil.errors import ConfigError, TripError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dcmp_hil.config import Rig
-    from dcmp_hil.errors import TripError
     from dcmp_hil.session import Result
 
 _RUNS = Path("runs")
@@ -35,6 +39,7 @@ class RunFolder:
     """
 
     def __init__(self, rig_name: str) -> None:
+        self._made_parent = not _RUNS.exists()
         stem = f"{utc_now():%Y%m%dT%H%M%SZ}-{rig_name}"
         for suffix in ("", *(f"-{n}" for n in range(2, 100))):
             self.path = _RUNS / f"{stem}{suffix}"
@@ -60,33 +65,28 @@ class RunFolder:
         """Where the run's own recording goes, with every period."""
         return self.path / "run.mcap"
 
-    def write(
-        self,
-        rig: Rig,
-        document: dict[str, Any],
-        result: Result,
-        trip: TripError | None,
-        *,
-        draw: bool,
-    ) -> None:
-        """Write everything but the recording; a full disk costs a warning, not the figures on the screen.
+    def write(self, rig: Rig, document: dict[str, Any], error: BaseException | None) -> list[str]:
+        """Write figures and black box, print nothing; return a sentence for each that is missing."""
+        figures = {**document, "rig_toml": rig.model_dump(mode="json")}
+        missing = [self._kept("summary.json", lambda path: write_text(path, console.as_json(figures)))]
+        if isinstance(error, TripError):
+            missing.append(self._kept("black_box.csv", lambda path: write_text(path, _black_box(error))))
+        return [sentence for sentence in missing if sentence]
 
-        Drawing takes seconds, which whoever ended the run early has not got.
-        """
+    def _kept(self, name: str, write: Callable[[Path], None]) -> str:
+        """Write one file; return what went wrong."""
         try:
-            console.write_json(
-                str(self.path / "summary.json"), {**document, "rig_toml": rig.model_dump(mode="json")}
-            )
-            if trip is not None:
-                self._write_black_box(trip)
-            if result.columns and draw:
-                self._draw(result)
-        except (OSError, ConfigError) as error:
-            console.warn(f"{self.path} is incomplete: {error}")
+            write(self.path / name)
+        except Exception as error:  # noqa: BLE001 - a file that is missing must not cost another one
+            return f"{self.path} is incomplete: {name}: {getattr(error, 'strerror', None) or error}"
+        return ""
 
     def discard(self) -> None:
-        """Remove the folder of a run that never began."""
+        """Remove the folder of a run that never began, and the one above it if it is the only one ever."""
         shutil.rmtree(self.path, ignore_errors=True)
+        if self._made_parent:
+            with suppress(OSError):
+                self.path.parent.rmdir()
 
     def tell(self, record: Path | None, *, live: bool) -> None:
         """Say where things are and how to look at them."""
@@ -98,28 +98,39 @@ class RunFolder:
         if picture.exists():
             console.note(f"or look at {picture}")
 
-    def _draw(self, result: Result) -> None:
+    def draw(self, result: Result) -> None:
+        """Draw the run, if its columns were kept; without a picture it is as complete."""
+        if not result.columns:
+            return
+        picture = self.path / "run.png"
         try:
             from dcmp_hil.telemetry.picture import draw_run
 
-            draw_run(result.columns, f"{result.rig.name}", self.path / "run.png")
-        except ConfigError as error:  # matplotlib is an extra
-            console.note(f"no picture: {error}")
+            draw_run(result.columns, result.rig.name, picture)
+        except BaseException as error:
+            with suppress(OSError):
+                picture.unlink()  # half a picture
+            if not isinstance(error, Exception):
+                raise
+            # Matplotlib is an extra, the disk may be full, and settings of Matplotlib may be wrong.
+            console.note(f"no picture: {str(error) or type(error).__name__}")
 
-    def _write_black_box(self, trip: TripError) -> None:
-        """One row a cycle of the last second, flat."""
-        with (self.path / "black_box.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(
-                [
-                    *("t_s", "position_rad", "voltage_applied_V", "fault"),
-                    *("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2"),
-                    *("position_reference_rad", "velocity_reference_rad_s", "acceleration_reference_rad_s2"),
-                    *("voltage_demand_V", "voltage_sent_V", "period_s", "lateness_s", "compute_s"),
-                ]
-            )
-            for c in trip.cycles:
-                writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing])
+
+def _black_box(trip: TripError) -> str:
+    """Return one row a cycle of the last second, flat."""
+    file = io.StringIO(newline="")
+    writer = csv.writer(file)
+    writer.writerow(
+        [
+            *("t_s", "position_rad", "voltage_applied_V", "fault"),
+            *("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2"),
+            *("position_reference_rad", "velocity_reference_rad_s", "acceleration_reference_rad_s2"),
+            *("voltage_demand_V", "voltage_sent_V", "period_s", "lateness_s", "compute_s"),
+        ]
+    )
+    for c in trip.cycles:
+        writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing])
+    return file.getvalue()
 
 
 def _viewer_command() -> str:

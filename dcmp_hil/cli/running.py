@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import signal
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
 from dcmp_hil.cli.onlookers import dashboard, recording, status_line
+from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.cli.watching import watched
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import TripError
+from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
+    from dcmp_hil.session import Result
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
@@ -53,6 +56,10 @@ class Options:
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     """Run, show, keep; return the exit code."""
+    try_places(
+        {"--json": json_place(options.json_file), "--record": options.record},
+        {"the rig": Path(rig_name)} if rig_name.endswith(".toml") else None,
+    )
     rig = load_rig(rig_name, overrides)
     for sentence in warnings(rig):
         console.warn(sentence)
@@ -66,9 +73,28 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
 
 
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
+    """Run, and keep files before anything is printed; the run's own end decides the exit code."""
     folder = RunFolder(rig.name) if options.keep else None
+    began = False
+    try:
+        session = _session(rig, faults, options, folder, stop)
+        end = _to_its_end(session)
+        began = session.began
+        if began:
+            _conclude(session, options, folder, end)
+    finally:
+        if folder is not None and not began:  # its error says why
+            folder.discard()
+    if end.error is not None:
+        raise end.error
+    return end.code
+
+
+def _session(
+    rig: Rig, faults: Faults, options: Options, folder: RunFolder | None, stop: StopRequest
+) -> Session:
     length = rig.run.duration_s if options.duration is None else options.duration
-    session = Session(
+    return Session(
         rig,
         duration=options.duration,
         fast=options.fast,
@@ -80,23 +106,27 @@ def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
         control=_control(options),
         faults=faults,
     )
-    ended_by = "duration"
-    trip: TripError | None = None
+
+
+class _End(NamedTuple):
+    """How a run ended: in a word that stays the same, with what error, with which exit code if with none."""
+
+    ended_by: str
+    error: BaseException | None
+    code: int
+
+
+def _to_its_end(session: Session) -> _End:
+    stop = session.stop
     try:
         session.run()
-        ended_by = stop.signal.name if stop.signal else ended_by
-    except TripError as error:
-        trip, ended_by = error, error.reason
-        raise
+    except TripError as trip:
+        return _End(trip.reason, trip, trip.exit_code)
     except KeyboardInterrupt:  # a second Ctrl-C, because something hung; 0 V was driven on the way out
-        ended_by = "KeyboardInterrupt"
-        return 128 + signal.SIGINT
-    except BaseException as error:
-        ended_by = type(error).__name__
-        raise
-    finally:
-        _conclude(session, options, folder, ended_by, trip)
-    return stop.exit_code
+        return _End("KeyboardInterrupt", None, 128 + signal.SIGINT)
+    except BaseException as error:  # noqa: BLE001 - raised again as soon as everything is kept
+        return _End(type(error).__name__, error, 1)
+    return _End(stop.signal.name if stop.signal else "duration", None, stop.exit_code)
 
 
 def _control(options: Options) -> ControlProcess | None:
@@ -138,16 +168,29 @@ def _wants_picture(options: Options) -> bool:
     return _viewer(options) == "none"
 
 
-def _conclude(
-    session: Session, options: Options, folder: RunFolder | None, ended_by: str, trip: TripError | None
-) -> None:
-    """Print and keep the figures, however the run ended."""
-    result = session.result()
-    if not result.summary.periods and options.window_from == 0.0:  # it never began, and the error says why
+def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> None:
+    """Keep and print the figures, however the run ended; whatever fails here is told, and changes no end."""
+    cut_off = session.stop.signal is not None
+    with session.stop.held():
+        result = session.result()
+        document = _document(session, options, result, end.ended_by)
+        missing = folder.write(session.rig, document, end.error) if folder else []
+        missing += _write_json(options.json_file, document)
+    with suppress(KeyboardInterrupt):  # asked for once more: whoever reads is slow, or drawing is
+        if options.json_file == "-":
+            console.write_json("-", document)
+        else:
+            console.out.print(summary_table(session.rig, result, end.ended_by))
+        for sentence in missing:
+            console.warn(sentence)
         if folder is not None:
-            folder.discard()
-        return
-    document: dict[str, Any] = {
+            if not cut_off:  # drawing takes seconds, which whoever ended the run early has not got
+                folder.draw(result)
+            folder.tell(options.record, live=_viewer(options) != "none")
+
+
+def _document(session: Session, options: Options, result: Result, ended_by: str) -> dict[str, Any]:
+    return {
         **asdict(result.summary),
         "rig": session.rig.name,
         "note": options.note,
@@ -164,10 +207,14 @@ def _conclude(
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
         "host": result.host,
     }
-    if options.json_file != "-":
-        console.out.print(summary_table(session.rig, result, ended_by))
-    if folder is not None:
-        folder.write(session.rig, document, result, trip, draw=session.stop.signal is None)
-        folder.tell(options.record, live=_viewer(options) != "none")
-    if options.json_file is not None:
-        console.write_json(options.json_file, document)
+
+
+def _write_json(target: str | None, document: dict[str, Any]) -> list[str]:
+    """Write the file of `--json`; return what went wrong."""
+    if target is None or target == "-":
+        return []
+    try:
+        console.write_json(target, document)
+    except ConfigError as error:
+        return [str(error)]
+    return []

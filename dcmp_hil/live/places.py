@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import socket
-import stat
 import struct
 from contextlib import suppress
 from pathlib import Path
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.user_folder import private, temporary, usable
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
-_MINE = 0o700
 _LONGEST = 80  # characters: the path of a socket may have 107
 _PATIENCE = 0.5  # s to connect in
 
@@ -23,24 +22,19 @@ def folder() -> Path:
     Raises
     ------
     ConfigError
-        If it cannot be made, or belongs to somebody else.
+        If it cannot be made, or is not this user's alone.
     """
     base = os.environ.get("XDG_RUNTIME_DIR", "")
-    if len(base) > _LONGEST:
-        base = ""
-    place = Path(base) / "dcmp-hil" if base and Path(base).is_dir() else Path(f"/tmp/dcmp-hil-{os.getuid()}")  # noqa: S108 - its owner and mode are checked
     try:
-        place.mkdir(mode=_MINE, exist_ok=True)
-        found = place.lstat()
+        place = Path(base) / "dcmp-hil" if len(base) <= _LONGEST and usable(base) else temporary()
+        if len(str(place)) > _LONGEST:
+            place = Path("/tmp") / place.name  # noqa: S108 - its owner and mode are checked
+        return private(place)
     except OSError as error:
+        where = error.filename or "no folder for temporary files"
         raise ConfigError(
-            f"{place}: {error.strerror}. Set XDG_RUNTIME_DIR to a folder of your own."
+            f"{where}: {error.strerror or error}. Set XDG_RUNTIME_DIR to a folder of your own."
         ) from None
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
-        raise ConfigError(
-            f"{place} is no folder of yours alone. Remove it, or set XDG_RUNTIME_DIR to one that is."
-        )
-    return place
 
 
 def socket_of(pid: int) -> Path:

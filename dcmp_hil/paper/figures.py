@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.paper.panels import FIGURES, Panel, series
 
@@ -62,22 +63,23 @@ def draw(reproduction: Reproduction, folder: Path) -> list[Path]:
     ConfigError
         If matplotlib is missing or the folder cannot be written.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ConfigError(
-            "Figures need matplotlib. Install it: pip install 'dcmp-hil[plot]', or use --no-figures."
-        ) from None
-    table = series(reproduction.corrected)
-    written = []
-    with mpl.rc_context(_STYLE):
-        for name, (title, panels) in FIGURES.items():
-            figure = Figure(figsize=(7.2, 0.5 + 1.9 * len(panels)), dpi=_DPI, layout="constrained")
-            FigureCanvasAgg(figure)
-            _lay_out(figure, title, panels, table)
-            written.append(_save(figure, folder / name))
+    with files_only():
+        try:
+            import matplotlib as mpl
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+            from matplotlib.figure import Figure
+        except ImportError:
+            raise ConfigError(
+                "Figures need matplotlib. Install it: pip install matplotlib, or use --no-figures."
+            ) from None
+        table = series(reproduction.corrected)
+        written = []
+        with mpl.rc_context(_STYLE):
+            for name, (title, panels) in FIGURES.items():
+                figure = Figure(figsize=(7.2, 0.5 + 1.9 * len(panels)), dpi=_DPI, layout="constrained")
+                FigureCanvasAgg(figure)
+                _lay_out(figure, title, panels, table)
+                written.append(_save(figure, folder / name))
     return written
 
 

@@ -43,7 +43,7 @@ class Table(ReferenceSettings):
             from scipy.interpolate import CubicSpline
         except ImportError:
             raise ConfigError(
-                "reference.kind = \"csv\" needs scipy for its spline: pip install 'dcmp-hil[plot]'"
+                'reference.kind = "csv" needs scipy for its spline: pip install scipy'
             ) from None
         columns = read_columns(Path(self.file), ("time_s", "position_rad"))
         time = columns["time_s"]

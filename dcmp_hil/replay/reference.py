@@ -108,8 +108,6 @@ def _both_ways(values: NDArray[np.float64], corner: float, pad: int) -> NDArray[
     try:
         from scipy.signal import butter, sosfiltfilt
     except ImportError:
-        raise ConfigError(
-            "The zero-phase reference needs scipy. Install it: pip install 'dcmp-hil[plot]'"
-        ) from None
+        raise ConfigError("The zero-phase reference needs scipy. Install it: pip install scipy") from None
     sections = butter(_ORDER, corner, fs=1.0, output="sos")
     return np.asarray(sosfiltfilt(sections, values, padlen=pad), dtype=np.float64)

@@ -11,44 +11,72 @@ from dcmp_hil.telemetry.audience import Sink
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.values import Event
+
 SinkMaker: TypeAlias = Callable[[], Sink]
 """Makes a sink; may raise ConfigError. What the sink lists in its `warnings` becomes events."""
 
 
-def make_all(sinks: Sequence[Sink | SinkMaker]) -> tuple[list[Sink], list[str]]:
-    """Return sinks, those made that must be, and the warnings of these.
+class Deferred:
+    """A sink that is made when its run begins: describing a run creates no file.
 
-    Raises
-    ------
-    ConfigError
-        If one that makes a sink does.
+    Parameters
+    ----------
+    maker
+        Makes it.
     """
-    made: list[Sink] = []
-    warnings: list[str] = []
-    for one in sinks:
-        if isinstance(one, Sink):
-            made.append(one)
-            continue
+
+    def __init__(self, maker: SinkMaker) -> None:
+        self._maker = maker
+        self._sink: Sink | None = None
+        self._missing: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """What the sink, or the run without it, goes on without."""
+        warnings: Sequence[str] = getattr(self._sink, "warnings", self._missing)
+        return warnings
+
+    def make(self) -> None:
+        """Make the sink; until then it takes nothing.
+
+        Raises
+        ------
+        ConfigError
+            If its maker does.
+        """
         try:
-            made.append(one())
+            self._sink = self._maker()
         except ImportError as error:  # a viewer's library that this system lacks ends no run
-            warnings.append(f"A sink could not be made, the run goes on without it: {error}")
-        else:
-            warnings += getattr(made[-1], "warnings", ())
-    return made, warnings
+            self._missing = (f"A sink could not be made, the run goes on without it: {error}",)
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        if self._sink:
+            self._sink.block(block)
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        if self._sink:
+            self._sink.event(event)
+
+    def close(self) -> None:
+        """Finish."""
+        if self._sink:
+            self._sink.close()
 
 
-def sorted_out(sinks: Sequence[Sink | SinkMaker]) -> tuple[list[Sink], list[str], list[bytes]]:
-    """Return the sinks that run in this process, their warnings, and pickled what makes one in another.
+def deferred(sinks: Sequence[Sink | SinkMaker]) -> list[Sink]:
+    """Return sinks, and a `Deferred` in place of each function that makes one."""
+    return [one if isinstance(one, Sink) else Deferred(one) for one in sinks]
 
-    Raises
-    ------
-    ConfigError
-        If one that makes a sink here does.
-    """
+
+def sorted_out(sinks: Sequence[Sink | SinkMaker]) -> tuple[list[Sink], list[bytes]]:
+    """Return the sinks that run in this process, and pickled what makes one in another."""
     pickled = [b"" if isinstance(one, Sink) else _pickled(one) for one in sinks]
-    here, warnings = make_all([one for one, data in zip(sinks, pickled, strict=True) if not data])
-    return here, warnings, [data for data in pickled if data]
+    here = deferred([one for one, data in zip(sinks, pickled, strict=True) if not data])
+    return here, [data for data in pickled if data]
 
 
 def _pickled(maker: SinkMaker) -> bytes:

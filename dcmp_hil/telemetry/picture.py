@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
 from dcmp_hil.telemetry.titles import title
@@ -53,17 +54,22 @@ def draw_run(columns: dict[str, NDArray[np.float64]], title: str, path: Path) ->
     ConfigError
         If matplotlib is missing, or the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ConfigError(
-            "Drawing needs matplotlib, which is not installed. Install it: pip install 'dcmp-hil[plot]'."
-        ) from None
-    figure = Figure(figsize=(12.8, 7.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=13, fontweight="bold", x=0.012, ha="left")
-    _draw_panels(figure, columns)
+    with files_only():
+        try:
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+            from matplotlib.figure import Figure
+        except ImportError:
+            raise ConfigError(
+                "Drawing needs matplotlib, which is not installed. Install it: pip install matplotlib"
+            ) from None
+        figure = Figure(figsize=(12.8, 7.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        figure.suptitle(title, fontsize=13, fontweight="bold", x=0.012, ha="left")
+        _draw_panels(figure, columns)
+        _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
     try:
         figure.savefig(path, dpi=150)
     except (OSError, ValueError) as error:  # ValueError: an ending that is no format

@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from dcmp_hil.errors import OpenError
+from dcmp_hil.user_folder import private, temporary
 
 _HERE = Path(__file__).parents[1]
 _PLACES = (_HERE / "firmware", _HERE.parent / "firmware")  # in the wheel; in a checkout
@@ -86,8 +87,31 @@ def _version(compiler: list[str]) -> str:
 
 
 def _cache() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-    return Path(base) / "dcmp-hil"
+    """Return the folder of what was compiled; for a user without a home one beside those of others.
+
+    Raises
+    ------
+    OpenError
+        If there is none that is this user's alone.
+    """
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    if base:
+        return Path(base) / "dcmp-hil"
+    try:
+        return Path.home() / ".cache" / "dcmp-hil"
+    except RuntimeError:  # an id without an entry in the table of users, such as a container's
+        pass
+    try:
+        return private(temporary())
+    except OSError as error:
+        raise _unwritable(Path(error.filename or "TMPDIR"), error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> OpenError:
+    return OpenError(
+        f"{folder}: {error.strerror or error}. The virtual device is compiled there; point "
+        "XDG_CACHE_HOME at a folder you may write in."
+    )
 
 
 def _compile(command: list[str], files: list[Path], target: Path) -> None:
@@ -100,10 +124,7 @@ def _compile(command: list[str], files: list[Path], target: Path) -> None:
             _run([*command, "-o", str(made), *inputs])
             made.replace(target)
     except OSError as error:
-        raise OpenError(
-            f"{target.parent}: {error.strerror or error}. The virtual device is compiled there; point "
-            "XDG_CACHE_HOME at a folder you may write in."
-        ) from error
+        raise _unwritable(target.parent, error) from error
 
 
 def _run(command: list[str]) -> str:

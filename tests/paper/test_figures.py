@@ -71,10 +71,10 @@ def test_draw_says_so_when_the_disk_is_full(reproduction: Reproduction, tmp_path
         draw(reproduction, tmp_path)
 
 
-def test_draw_names_the_extra_when_matplotlib_is_missing(
+def test_draw_names_the_package_when_matplotlib_is_missing(
     reproduction: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ConfigError, match=r"pip install 'dcmp-hil\[plot\]'"):
+    with pytest.raises(ConfigError, match=r"pip install matplotlib"):
         draw(reproduction, tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -63,5 +63,5 @@ def test_unwritable_picture_is_a_config_error(name: str, tmp_path: Path) -> None
 
 def test_missing_matplotlib_names_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    with pytest.raises(ConfigError, match=r"dcmp-hil\[plot\]"):
+    with pytest.raises(ConfigError, match=r"pip install matplotlib"):
         draw_run({}, "bare", tmp_path / "run.png")
