@@ -49,6 +49,11 @@ def open_can(rig: Rig, clock: Clock) -> DeviceBackend:
     return DeviceBackend(rig, CanLink(settings, clock), clock)
 
 
+def listen(settings: CanSettings, clock: Clock) -> CanLink:
+    """Make a link that writes nothing by itself."""
+    return CanLink(settings, clock, listen_only=True)
+
+
 class CanLink:
     """A CAN bus.
 

@@ -1,4 +1,4 @@
-"""The table of backends: name in rig.toml to `module:factory`; a factory takes (rig, clock)."""
+"""The tables of backends and links: names in rig.toml to `module:factory`."""
 
 KINDS = {
     "sim": "sim_backend.backend:SimBackend",
@@ -6,3 +6,10 @@ KINDS = {
     "serial": "dcmp_hil.backends.serial_link:open_serial",
     "can": "dcmp_hil.backends.can_link:open_can",
 }
+"""Backends; a factory takes (rig, clock)."""
+
+LINKS = {
+    "serial": "dcmp_hil.backends.serial_link:listen",
+    "can": "dcmp_hil.backends.can_link:listen",
+}
+"""Links to listen on, one for every device on a wire; a factory takes (settings, clock)."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.backends import Can, Serial
+from dcmp_hil.backends.kinds import LINKS
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
@@ -21,15 +22,11 @@ def make_link(settings: Section, clock: Clock) -> Link:
     ConfigError
         If that kind has no link that one could listen to.
     """
-    if isinstance(settings, Serial):
-        from dcmp_hil.backends.serial_link import SerialLink
-
-        return SerialLink(settings.port, settings.baud, listen_only=True)
-    if isinstance(settings, Can):
-        from dcmp_hil.backends.can_link import CanLink
-
-        return CanLink(settings, clock, listen_only=True)
-    raise ConfigError(
-        f'backend.kind: got "{getattr(settings, "kind", "")}", which has no wire to listen to. Use "serial" '
-        'or "can", such as --set backend.kind=serial --set backend.port=/dev/ttyACM0.'
-    )
+    kind = getattr(settings, "kind", "")
+    if kind not in LINKS:
+        raise ConfigError(
+            f'backend.kind: got "{kind}", which has no wire to listen to. Use "serial" '
+            'or "can", such as --set backend.kind=serial --set backend.port=/dev/ttyACM0.'
+        )
+    link: Link = find_named(LINKS[kind], "backend.kind")(settings, clock)
+    return link

@@ -38,6 +38,11 @@ def open_serial(rig: Rig, clock: Clock) -> DeviceBackend:
     return DeviceBackend(rig, SerialLink(settings.port, settings.baud), clock)
 
 
+def listen(settings: SerialSettings, _: Clock) -> SerialLink:
+    """Make a link that writes nothing by itself."""
+    return SerialLink(settings.port, settings.baud, listen_only=True)
+
+
 class SerialLink:
     """A serial port, opened by this process alone.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -74,22 +74,6 @@ ReferenceSection = Annotated[
 ]
 
 
-KINDS: dict[str, dict[str, type[Section]]] = {
-    "backend": {"sim": Sim, "sim-board": SimBoard, "serial": Serial, "can": Can, "custom": CustomBackend},
-    "observer": {"super_twisting": SuperTwistingSettings, "paper": PaperSettings, "custom": Custom},
-    "controller": {"pd_compensated": PdSettings, "pd": PdSettings, "custom": CustomController},
-    "reference": {
-        "sine": Sine,
-        "chirp": Chirp,
-        "hold": Hold,
-        "step": Step,
-        "trapezoid": Trapezoid,
-        "csv": Table,
-    },
-}
-"""Tables that come in kinds, and what each kind has; the first is the default."""
-
-
 class Rig(Section):
     """Everything about one rig and one way of running it."""
 
@@ -156,3 +140,17 @@ class Rig(Section):
         if faults:
             raise ValueError("\n".join(faults))
         return self
+
+
+def _kinds(union: Any) -> dict[str, type[Section]]:
+    """Return the members of a union of tagged tables by their tags, in its order."""
+    tagged = map(get_args, get_args(union))
+    return {tag.tag: table for table, tag in tagged}
+
+
+KINDS: dict[str, dict[str, type[Section]]] = {
+    name: _kinds(field.annotation)
+    for name, field in Rig.model_fields.items()
+    if any(isinstance(one, Discriminator) for one in field.metadata)
+}
+"""Tables that come in kinds, and what each kind has; the first is the default."""

@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from dcmp_hil.telemetry import portrait
 from dcmp_hil.telemetry.parameters import PATH, RELATIVE
 from dcmp_hil.telemetry.scenery import LINK
+from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.telemetry.titles import title
 
 if TYPE_CHECKING:
@@ -17,17 +18,18 @@ if TYPE_CHECKING:
 
 TIMELINE = "loop_time"
 _WINDOW = 10.0  # s on the axis of every plot
+_JOINT, _VOLTAGE, _TIMING = "joint/", "control/voltage_V", "loop/timing_us"  # plots with a place of their own
 _BEYOND_LIMIT = 1.3  # so that the lines of the limit show
 
 
 def dashboard(rig: RigView) -> rrb.Blueprint:
     """Lay out the run of a rig: the arm, what it does, what is asked of the motor, and how the loop fares."""
     left = rrb.Vertical(_pendulum(rig), _portrait(), _parameters(), row_shares=[36, 32, 32])
-    joint = rrb.Vertical(
-        plot("joint/position_rad"), plot("joint/velocity_rad_s"), plot("joint/disturbance_rad_s2")
-    )
-    timing = rrb.Horizontal(_timing(), _histograms(), column_shares=[56, 44])
-    control = rrb.Vertical(plot("control/tracking_error_mrad", legend=False), _voltage(rig), timing)
+    plots = {path: _plot_of(path, len(signals), rig) for path, signals in by_plot().items()}
+    joint = rrb.Vertical(*(plots[path] for path in plots if path.startswith(_JOINT)))
+    timing = rrb.Horizontal(plots[_TIMING], _histograms(), column_shares=[56, 44])
+    others = [plots[path] for path in plots if not path.startswith(_JOINT) and path != _TIMING]
+    control = rrb.Vertical(*others, timing)
     states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
     if rig.wired:
         states = rrb.Horizontal(_states(), _link(), _events(), column_shares=[36, 24, 40])
@@ -84,13 +86,15 @@ def plot(
     )
 
 
-def _voltage(rig: RigView) -> rrb.TimeSeriesView:
-    limit = rig.voltage_limit
-    return plot("control/voltage_V", reach=None if limit is None else _BEYOND_LIMIT * limit)
-
-
-def _timing() -> rrb.TimeSeriesView:
-    return plot("loop/timing_us", name="Timing, worst [µs]")
+def _plot_of(path: str, lines: int, rig: RigView) -> rrb.TimeSeriesView:
+    """Lay out a plot of the table of signals; a single line needs no name."""
+    limit = rig.voltage_limit if path == _VOLTAGE else None
+    return plot(
+        path,
+        legend=lines > 1,
+        reach=None if limit is None else _BEYOND_LIMIT * limit,
+        name="Timing, worst [µs]" if path == _TIMING else "",
+    )
 
 
 def _last(seconds: float) -> rr.VisibleTimeRange:

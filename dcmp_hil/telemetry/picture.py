@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,14 +25,7 @@ if TYPE_CHECKING:
 
 _MOST_POINTS = 20_000
 _BUCKETS = 4_000  # each keeps its lowest and its highest point
-_PANELS = (
-    "joint/position_rad",
-    "joint/velocity_rad_s",
-    "joint/disturbance_rad_s2",
-    "control/tracking_error_mrad",
-    "control/voltage_V",
-    "loop/timing_us",
-)  # the first half on the left
+_COLUMNS = 2  # of plots; the first half of the table is on the left
 _GREY = "#4a4f57"
 _START = 5.0  # times the largest error of the second half: a start beyond that gets no room
 _CLIPPED = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
@@ -103,17 +97,20 @@ def thinned(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDA
 
 
 def _draw_panels(figure: Figure, columns: Columns) -> None:
-    rows = len(_PANELS) // 2
-    grid = figure.subplots(rows, 2, sharex=True, squeeze=False)
     plots = by_plot()
-    for k, name in enumerate(_PANELS):
-        axes = grid[k % rows][k // rows]
-        _draw_panel(axes, columns, plots[name])
+    rows = math.ceil(len(plots) / _COLUMNS)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
+    panels = list(grid.T.flat)
+    for axes in panels[len(plots) :]:
+        axes.remove()
+    for axes, (name, signals) in zip(panels, plots.items(), strict=False):
+        _draw_panel(axes, columns, signals)
         _dress(axes, name)
         if name == "control/tracking_error_mrad":
             _fit_to_second_half(axes)
-    for axes in grid[-1]:
+    for axes in (panels[rows - 1], panels[len(plots) - 1]):  # the lowest of each column
         axes.set_xlabel("time [s]", fontsize=9, color=_GREY)
+        axes.tick_params(labelbottom=True)
 
 
 def _draw_panel(axes: Axes, columns: Columns, signals: list[Signal]) -> None:

@@ -19,7 +19,7 @@ from sim_backend.faults.host import InjectedError
 from sim_backend.faults.parser import WrongFaultError
 from sim_backend.faults.plan import FaultPlan, inject
 from tests.faults.matrix import judge, outcome_of
-from tests.faults.rows import ROWS, SILENT, Row
+from tests.faults.rows import SILENT, Row
 from tests.helpers import bench
 
 if TYPE_CHECKING:
@@ -47,9 +47,8 @@ def lost_at(result: Result) -> list[int]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_can_be_made_with_its_defaults_and_is_in_the_matrix(kind: str) -> None:
+def test_every_kind_can_be_made_with_its_defaults(kind: str) -> None:
     assert Fault.of(kind).params.keys() == KINDS[kind].params.keys()
-    assert any(row.fault.partition(":")[0] == kind for row in ROWS)
 
 
 @pytest.mark.parametrize("kind", KINDS)

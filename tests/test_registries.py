@@ -1,0 +1,155 @@
+"""Every registry is walked: what is added to one is tested and shown, or a test here fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, get_args
+
+import pytest
+import rerun.blueprint as rrb
+
+from dcmp_hil.backends import kinds
+from dcmp_hil.backends.links import make_link
+from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.config import load_rig
+from dcmp_hil.config.backends import Device, SimBoard
+from dcmp_hil.config.explain import warnings
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.sections import SimSection
+from dcmp_hil.plugins import find_named
+from dcmp_hil.telemetry import signals
+from dcmp_hil.telemetry.blueprint import dashboard
+from dcmp_hil.telemetry.keeper import Keeper
+from dcmp_hil.telemetry.picture import draw_run
+from dcmp_hil.telemetry.signals import SIGNALS, by_plot
+from sim_backend.faults.fault import KINDS as FAULTS
+from sim_backend.plant import make_plant
+from tests.contract.benches import ALL, on_bench
+from tests.faults.rows import ROWS
+from tests.helpers import bench
+from tests.telemetry.runs import VIEW, feed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+SHIPPED = [kind for kind in KINDS["backend"] if kind != "custom"]
+OTHER_COLOURS = ((1, 2, 3), (9, 8, 250))
+MORE = (
+    replace(SIGNALS[0], column="current_A", plot="motor/current_A", colour=OTHER_COLOURS[0]),
+    replace(SIGNALS[0], column="angle_rad", plot="joint/angle_rad", colour=OTHER_COLOURS[1]),
+)
+
+
+def rig_of(kind: str, *overrides: str) -> Any:
+    """Return the bench rig with a kind of backend, whatever keys it needs."""
+    needed = {"serial": ("backend.port=/dev/ttyACM0",)}.get(kind, ())
+    return bench(f"backend.kind={kind}", *needed, *overrides)
+
+
+# --------------------------------------------------------------------------------------------- backends
+
+
+def test_every_kind_of_backend_has_a_factory_and_a_bench_of_the_contract_suite() -> None:
+    assert list(kinds.KINDS) == SHIPPED
+    for kind, path in kinds.KINDS.items():
+        assert callable(find_named(path, kind))
+    benched = set()
+    for name in ALL:
+        with on_bench(name) as there:
+            benched.add(there.rig.backend.kind)
+    assert benched == set(SHIPPED)
+
+
+def test_every_carrier_of_the_board_in_this_process_is_on_a_bench() -> None:
+    carriers = get_args(SimBoard.model_fields["carrier"].annotation)
+    assert {f"sim-board {carrier}" for carrier in carriers} <= set(ALL)
+
+
+def test_every_device_on_a_wire_can_be_listened_to() -> None:
+    wired = [kind for kind in SHIPPED if KINDS["backend"][kind].device and not is_simulated(kind)]  # type: ignore[attr-defined]
+    assert list(kinds.LINKS) == wired
+    for kind in wired:
+        link = make_link(rig_of(kind).backend, SimulatedClock())
+        members = ("name", "corrupt", "pending", "open", "close", "send", "receive")
+        assert all(hasattr(link, member) for member in members)
+
+
+def is_simulated(kind: str) -> bool:
+    return bool(KINDS["backend"][kind].simulated)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_what_a_backend_is_agrees_with_what_its_factory_says(kind: str) -> None:
+    factory = find_named(kinds.KINDS[kind], kind)
+    assert is_simulated(kind) == getattr(factory, "simulated", False)
+    assert issubclass(KINDS["backend"][kind], Device) == KINDS["backend"][kind].device  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", [*SHIPPED, "tests.helpers:LosesSamples"])
+def test_a_start_without_a_probe_is_warned_of_wherever_a_motor_may_move(kind: str) -> None:
+    moves = kind not in SHIPPED or not is_simulated(kind)
+    warned = any(
+        "supervisor.probe" in sentence for sentence in warnings(rig_of(kind, "supervisor.probe=off"))
+    )
+    assert warned == moves
+
+
+# ----------------------------------------------------------------------------------- tables of the rig
+
+
+@pytest.mark.parametrize("integrator", get_args(SimSection.model_fields["integrator"].annotation))
+def test_every_integrator_has_a_plant(integrator: str) -> None:
+    plant = make_plant(load_rig("bench-1khz", [f"sim.integrator={integrator}"]))
+    assert plant.advance(1.0).velocity > 0.0
+
+
+@pytest.mark.parametrize("table", KINDS)
+def test_every_kind_is_a_word_that_its_table_takes(table: str) -> None:
+    for kind, section in KINDS[table].items():
+        assert kind == "custom" or kind in get_args(section.model_fields["kind"].annotation)
+
+
+@pytest.mark.parametrize("table", ["observer", "controller"])
+def test_every_shipped_kind_can_be_built(table: str) -> None:
+    for kind, section in KINDS[table].items():
+        assert (kind == "custom") != callable(getattr(section, "build", None))
+
+
+# ------------------------------------------------------------------------------------------------ faults
+
+
+def test_every_kind_of_fault_has_a_row_in_the_matrix() -> None:
+    rows = {row.fault.partition(":")[0] for row in ROWS}
+    assert set(FAULTS) == rows
+
+
+# ----------------------------------------------------------------------------------------------- signals
+
+
+def views(part: Any) -> Iterator[Any]:
+    """Yield every view of a layout."""
+    if isinstance(part, rrb.Container):
+        for inner in part.contents:
+            yield from views(inner)
+    else:
+        yield part
+
+
+@pytest.mark.parametrize("more", [(), MORE])
+def test_every_plot_of_the_table_is_in_the_dashboard(
+    monkeypatch: pytest.MonkeyPatch, more: tuple[signals.Signal, ...]
+) -> None:
+    monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, *more))
+    shown = [str(view.origin) for view in views(dashboard(VIEW).root_container)]
+    assert {signal.plot for signal in more} <= by_plot().keys()
+    assert all(shown.count(plot) == 1 for plot in by_plot())
+
+
+def test_every_plot_of_the_table_is_in_the_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    image = pytest.importorskip("matplotlib.image")
+    monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, MORE[0]))  # an odd number of plots
+    draw_run(feed(Keeper()), "with more", tmp_path / "run.png")
+    pixels = image.imread(tmp_path / "run.png")[..., :3].reshape(-1, 3)
+    found = {tuple(map(int, pixel)) for pixel in (pixels * 255).round().astype(int)}
+    assert MORE[0].colour in found
