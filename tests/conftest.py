@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.installed import Finished, environment, install
+from tests.sampling import MARKER, chosen
 from tools import screenshot
 
 FIGURE = "figure"
@@ -24,8 +25,22 @@ def figure(record_property: Callable[[str, object], None]) -> Callable[[str], No
     return lambda line: record_property(FIGURE, line)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Say how much of what is marked `sampled` is run."""
+    parser.addoption("--sample", type=int, default=1, metavar="N", help=f"of tests marked {MARKER}, one in N")
+    parser.addoption("--sample-of", default="", metavar="TEXT", help="what draws them, such as a commit")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest: begun last, it would leave the other workers without work."""
+    one_in, text = config.getoption("--sample"), config.getoption("--sample-of")
+    cases: dict[str, list[str]] = {}
+    for item in items:
+        if item.get_closest_marker(MARKER):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item.nodeid)
+    left_out = {name for names in cases.values() for name in names if name not in chosen(names, one_in, text)}
+    config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left_out])
+    items[:] = [item for item in items if item.nodeid not in left_out]
     items.sort(key=lambda item: not item.nodeid.startswith(_LONG))
 
 
