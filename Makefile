@@ -1,8 +1,11 @@
-# `make` alone lists the targets. Settings: PYTHON (the interpreter of a new environment), VENV (where it goes).
+# `make` alone lists the targets. Settings: PYTHON (the interpreter of a new environment), VENV (where it goes),
+# ARGS (for the command of a target), DEATHS and ENDINGS (real hosts of each way in `make faults`).
 
 PYTHON ?= python3
 VENV ?= .venv
 ARGS ?=
+DEATHS ?= 30
+ENDINGS ?= 10
 
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip -qq --disable-pip-version-check --no-input
@@ -51,9 +54,9 @@ faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real h
 	@failed=0; \
 	$(BIN)/python -m tools.faults --seeds 100 --healthy 1000 \
 		--markdown reports/faults.md --json reports/faults.json $(ARGS) || failed=1; \
-	$(BIN)/python -m tools.host_death --n 30 \
+	$(BIN)/python -m tools.host_death --n $(DEATHS) \
 		--markdown reports/host-death.md --json reports/host-death.json || failed=1; \
-	$(BIN)/python -m tools.host_endings --n 10 \
+	$(BIN)/python -m tools.host_endings --n $(ENDINGS) \
 		--markdown reports/host-endings.md --json reports/host-endings.json || failed=1; \
 	exit $$failed
 
@@ -81,7 +84,7 @@ lockcheck: $(DEV) ## the locks have a wheel of everything for each Python from 3
 		echo "$$lock: complete for Python $$version"; done; done
 
 clean: ## remove the environment, caches and reports; recordings in runs/ stay
-	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-3.* build dist htmlcov reports .coverage .coverage.* \
+	@rm -rf $(if $(wildcard $(VENV)/pyvenv.cfg),$(VENV)) .venv-* build dist htmlcov reports .coverage .coverage.* \
 		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	@find dcmp_hil sim_backend tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
 

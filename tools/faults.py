@@ -132,6 +132,28 @@ def variants(places: Sequence[int]) -> list[int]:
     return found
 
 
+def part_of(seeds: range, part: str) -> range:
+    """Return one of equal parts of some seeds.
+
+    Parameters
+    ----------
+    seeds
+        All of them.
+    part
+        Such as ``2/4``: the second quarter.
+
+    Raises
+    ------
+    ValueError
+        If there is no such part.
+    """
+    number, _, of = part.partition("/")
+    place, parts = int(number) - 1, int(of)
+    if not 0 <= place < parts:
+        raise ValueError(part)
+    return seeds[len(seeds) * place // parts : len(seeds) * (place + 1) // parts]
+
+
 def main() -> int:
     """Run, tell, and leave with 1 if something is wrong."""
     parser = argparse.ArgumentParser(prog="python -m tools.faults", description=__doc__)
@@ -141,6 +163,7 @@ def main() -> int:
     )
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: 0)")
     parser.add_argument("--healthy", type=int, default=50, help="runs without a fault (default: 50)")
+    parser.add_argument("--part", default="1/1", metavar="K/N", help="only this part of all seeds")
     parser.add_argument("--only", default="", metavar="TEXT", help="rows whose text has this in it")
     parser.add_argument("--processes", type=int, default=2, help="(default: 2)")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="where the table goes as well")
@@ -149,12 +172,14 @@ def main() -> int:
     clock = MonotonicClock()
     began_ns = clock.now_ns()
     places = [place for place, row in enumerate(ROWS) if asked.only in row.fault]
-    blocks = min(asked.healthy, 20)
+    wells = part_of(range(asked.healthy), asked.part)
+    blocks = min(len(wells), 20)
     with ProcessPoolExecutor(asked.processes) as pool:
         further = asked.seeds if asked.further is None else min(asked.further, asked.seeds)
         runs = [asked.seeds if variant < _FIRST_VARIANTS else further for variant in variants(places)]
-        lines = pool.map(run_row, places, [range(asked.first, asked.first + n) for n in runs])
-        healthy_seeds = [range(block, asked.healthy, blocks) for block in range(blocks)]
+        seeds = [part_of(range(asked.first, asked.first + n), asked.part) for n in runs]
+        lines = pool.map(run_row, places, seeds)
+        healthy_seeds = [wells[block::blocks] for block in range(blocks)]
         table = [*lines, *([merged([*pool.map(run_healthy, healthy_seeds)])] if blocks else [])]
     said: list[str] = []
     code = tell(table, 1e-9 * (clock.now_ns() - began_ns), said.append)

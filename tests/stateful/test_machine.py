@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 
 import pytest
-from hypothesis import HealthCheck, Phase, settings
+from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis.stateful import run_state_machine_as_test
 
 from tests.stateful.machine import Machine
 
 STEPS = int(os.environ.get("DCMP_STATEFUL_STEPS", "100000"))
+PARTS = 8  # of them, each with a seed of its own
 LENGTH = 250  # rules in an example at most; the mean is nearly that
 _MEAN = 205
 
@@ -23,8 +24,12 @@ def budget(examples: int, length: int) -> settings:
     )  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.usefixtures("untraced")
-def test_no_sequence_of_events_breaks_a_rule() -> None:
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_sequence_of_events_breaks_a_rule(part: int) -> None:
+    steps = STEPS // PARTS
     Machine.steps = 0
-    run_state_machine_as_test(Machine, settings=budget(1 + STEPS // _MEAN, LENGTH))
-    assert Machine.steps >= STEPS, f"{Machine.steps} steps are fewer than {STEPS}"
+    machine = seed(part)(type("Part", (Machine,), {}))
+    run_state_machine_as_test(machine, settings=budget(1 + steps // _MEAN, LENGTH))
+    assert Machine.steps >= steps, f"{Machine.steps} steps are fewer than {steps}"

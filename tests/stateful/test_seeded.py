@@ -94,6 +94,7 @@ def found() -> str:
     return str(caught.value)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("error", IN_HOST, ids=str)
 def test_machine_finds_an_error_in_the_host(error: str, monkeypatch: Patch) -> None:
     IN_HOST[error](monkeypatch)
@@ -120,6 +121,7 @@ def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str
     hostlib.load.cache_clear()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("error", IN_FIRMWARE, ids=str)
 def test_machine_finds_an_error_in_the_firmware(error: str, sown: Callable[[str, str, str], None]) -> None:
     sown(*IN_FIRMWARE[error])

@@ -8,7 +8,7 @@ import pytest
 
 from tests.faults.matrix import Verdict
 from tests.faults.rows import ROWS
-from tools.faults import Line, merged, run_healthy, run_row, tell, variants
+from tools.faults import Line, merged, part_of, run_healthy, run_row, tell, variants
 
 GOOD = Verdict("stuck", True, 80.0, ())
 WRONG = Verdict("power", False, 120.0, ())
@@ -72,3 +72,12 @@ def test_ci_has_a_hundred_seeds_for_forty_rows_and_more() -> None:
     assert max(found) > 2
     assert found[0] == 0
     assert variants([3, 3, 3]) == [0, 1, 2]
+
+
+def test_parts_are_all_seeds_once() -> None:
+    parts = [part_of(range(3, 45), f"{number}/4") for number in range(1, 5)]
+    assert [seed for part in parts for seed in part] == list(range(3, 45))
+    assert {len(part) for part in parts} == {10, 11}
+    for wrong in ("0/4", "5/4", "4", ""):
+        with pytest.raises(ValueError):  # noqa: PT011 - argparse says which option
+            part_of(range(4), wrong)
