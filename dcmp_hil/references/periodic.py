@@ -3,11 +3,10 @@
 import math
 from typing import Literal
 
+from dcmp_hil.fast_tuple import make
 from dcmp_hil.references import ReferenceSettings
 from dcmp_hil.section import NotNegative, Positive
 from dcmp_hil.values import Reference
-
-_new = tuple.__new__  # half the time of a NamedTuple's own
 
 
 class Sine(ReferenceSettings):
@@ -28,7 +27,7 @@ class Sine(ReferenceSettings):
         amplitude, rate = self.amplitude_rad, self.rate_rad_s
         angle = rate * t + self.phase_rad
         swing = amplitude * math.sin(angle)
-        return _new(
+        return make(
             Reference,
             (self.offset_rad + swing, amplitude * rate * math.cos(angle), -rate * rate * swing),
         )
