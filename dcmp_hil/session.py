@@ -31,13 +31,14 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.backends.device import LinkCounters
+    from dcmp_hil.backends.goodbye import DeviceEnd
     from dcmp_hil.config import Rig
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live import Control
     from dcmp_hil.probe import MotorGain
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.wire.quality import Concern, LinkCounters
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,10 @@ class Result:
         Periods that telemetry lost because a sink was slow; they are in no figure.
     link
         What was lost or damaged on the way and survived; None where there is no wire.
+    link_concerns
+        What of it is more than `backend.warn_percent` and `backend.warn_clock_percent` allow, and its cause.
+    device_end
+        State and fault in which the device was left; None where there is none, or it did not say.
     grants
         What was asked of the operating system and what came of it; empty in virtual time.
     host
@@ -81,6 +86,8 @@ class Result:
     events: tuple[Event, ...]
     dropped: int = 0
     link: LinkCounters | None = None
+    link_concerns: tuple[Concern, ...] = ()
+    device_end: DeviceEnd | None = None
     grants: tuple[Grant, ...] = ()
     host: dict[str, Any] = field(default_factory=dict)
     overruns: int = 0
@@ -216,6 +223,9 @@ class Session:
                 self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.")
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
+            recorder.link.finish(recorder.t)
+            if end == _AT_ZERO:
+                self._tell_how_device_ended()
             recorder.event(Event(recorder.t, *end))
             recorder.close()
             if self._apart:
@@ -247,6 +257,16 @@ class Session:
             line.trajectory.lower(t + line.delay)
             loop.run(line, t + line.delay + LOWERING, self.stop)
 
+    def _tell_how_device_ended(self) -> None:
+        """Warn where the device stopped by a fault of its own at the end, and not because it was told to."""
+        ended = getattr(self._line.backend, "device_end", None)
+        if ended and ended.fault:
+            sentence = (
+                f"the device ended the run by itself, in fault {ended.fault}: the last commands, 0 V and "
+                "disarm, did not reach it. Check the way from host to device."
+            )
+            self._recorder.event(Event(self._recorder.t, "WARN", sentence))
+
     def _say_where(self) -> None:
         """Tell of the computer, and of what it did not grant."""
         self._recorder.event(Event(0.0, "INFO", in_words(self._host)))
@@ -273,6 +293,8 @@ class Session:
             events=self._figures.events(),
             dropped=self._apart.dropped if self._apart else self._recorder.dropped,
             link=getattr(self._line.backend, "counters", None),
+            link_concerns=tuple(self._recorder.link.concerns.values()),
+            device_end=getattr(self._line.backend, "device_end", None),
             grants=tuple(self._realtime.grants) if self._realtime else (),
             host=self._host,
             overruns=self._line.overruns.count,

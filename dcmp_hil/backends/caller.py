@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.counters import nearest
-from dcmp_hil.wire.messages import FaultReport, Parameter, ParameterValue, SampleReport
+from dcmp_hil.wire.messages import FaultReport, Health, Parameter, ParameterValue, SampleReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,6 +43,7 @@ class Caller:
         self.sample: SampleReport | None = None  # the newest
         self.tick = tick  # of it; whole once PARAMETER_VALUE(TICK) was heard
         self.fault = 0  # code of the last fault heard of
+        self.health: Health | None = None  # the newest
         self.foreign = 0  # frames that are not this device's
         self.corrupt = 0  # frames whose crc8 was wrong
 
@@ -114,6 +115,8 @@ class Caller:
             self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
         elif isinstance(message, FaultReport):
             self.fault = message.code
+        elif isinstance(message, Health):
+            self.health = message
         elif isinstance(message, ParameterValue) and message.id == Parameter.TICK:
             self.tick = message.value
         return message

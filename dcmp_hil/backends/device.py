@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn, Self
 
+from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import MOST_WAITING, Caller
-from dcmp_hil.backends.goodbye import Goodbye
+from dcmp_hil.backends.goodbye import DeviceEnd, Goodbye
 from dcmp_hil.backends.handshake import Handshake
+from dcmp_hil.backends.link_meter import LinkMeter
 from dcmp_hil.backends.terms import Terms
-from dcmp_hil.errors import BackendError, LinkError, SampleTimeoutError, TripError
+from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.fast_tuple import make
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
-from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
+from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Drive, FaultReport, Health, SampleReport, State, Stop, StopReason
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+from dcmp_hil.wire.quality import judge
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.wire.frame import Frame
+    from dcmp_hil.wire.quality import Concern, LinkCounters
 
 _SEQ = 0x1FFF
 _RUN = int(State.RUN)
@@ -34,16 +37,6 @@ _OTHER_FAULT = 7  # fault_class that only says: see FAULT
 _MOST_LOST = 127  # periods that a tick of 8 bits can bridge
 _SURELY_NS = 200_000_000  # after which any watchdog has acted
 _SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: the end
-
-
-@dataclass(slots=True)
-class LinkCounters:
-    """What went wrong on the way and was survived."""
-
-    lost: int = 0  # SAMPLEs that never came
-    stale: int = 0  # SAMPLEs that came too late, or twice
-    skipped: int = 0  # SAMPLEs that were waiting behind a newer one
-    corrupt: int = 0  # frames whose crc8 was wrong
 
 
 class DeviceBackend:
@@ -81,9 +74,10 @@ class DeviceBackend:
         self._heard_ns = 0
         self._forgotten = False  # the device has given us up, and may be somebody else's
         self._answered = 0  # tick of the SAMPLE that was answered last
-        self.counters = LinkCounters()
-        self.health: Health | None = None
+        self._meter = LinkMeter(link, 1e9 * rig.period)
+        self._rates = terms.warn_share, terms.warn_clock_share
         self.firmware = ""
+        self.device_end: DeviceEnd | None = None  # how it was left, as far as it said so
 
     def __enter__(self) -> Self:
         """Open the link, make the device ours, and arm it at 0 V.
@@ -107,6 +101,7 @@ class DeviceBackend:
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
         self._heard_ns = self._clock.now_ns()
+        self._meter.start(greeting.tick, self._heard_ns, caller.health)
         self._open = True
         return self
 
@@ -136,6 +131,20 @@ class DeviceBackend:
             self._link.close()
 
     @property
+    def counters(self) -> LinkCounters:
+        """What was lost, late and damaged since the device was armed; a copy."""
+        return self._meter.counters
+
+    @property
+    def health(self) -> Health | None:
+        """The newest HEALTH of the device."""
+        return self._meter.health
+
+    def concerns(self, counters: LinkCounters) -> list[Concern]:
+        """Say what these counters mean, by the rates of `[backend]`."""
+        return judge(counters, *self._rates)
+
+    @property
     def described(self) -> str:
         """What the device says it is, once it is open."""
         return f"{self._link.name}, node {self._node}, firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
@@ -155,10 +164,7 @@ class DeviceBackend:
         report = self._next_report()
         _, voltage_mV, _, state, _, _, _ = report
         if state == _RUN and self._tick - self._answered > self._memory:
-            raise LinkError(
-                f"{self._link.name}: the device runs, and not on this host's commands: it was not heard of "
-                "for too long, and another host has it now. End one of the two."
-            )
+            raise refusals.taken_over(self._link.name)
         terms = self._terms
         position = (self._count - self._zero) * terms.rad_per_count
         fault = _HEALTHY if state == _RUN else self._fault_in(report)
@@ -173,6 +179,7 @@ class DeviceBackend:
         drive = make(Drive, fields)
         self._answered = self._tick
         self._link.send(pack(drive, self._node))
+        self._meter.answered(self._clock.now_ns())
 
     def truth(self) -> Truth:
         """Return NaN: nobody knows."""
@@ -181,21 +188,19 @@ class DeviceBackend:
     def _give_up_after(self, gap_ns: int) -> NoReturn:
         """Nobody can say any more which period it is; the device has its watchdog."""
         self._forgotten = gap_ns > _SURELY_NS
-        raise LinkError(
-            f"{self._link.name}: this computer stood still for {1e-9 * gap_ns:.2f} s. The device's watchdog "
-            "has taken the amplifier to 0 V. Start again."
-        )
+        raise refusals.stood_still(self._link.name, 1e-9 * gap_ns)
 
     def _next_report(self) -> SampleReport:
         """Wait for a SAMPLE; where several are waiting, the newest."""
         link, now_ns, newest = self._link, self._clock.now_ns, None
         began_ns = heard_ns = now_ns()
+        damaged, stale = self._meter.damaged, self._meter.counts.stale
         if began_ns - self._heard_ns > self._bridge_ns:
             self._give_up_after(began_ns - self._heard_ns)
         while newest is None:
             left_ns = began_ns + self._patience_ns - heard_ns
             if left_ns <= 0:
-                self._give_up()
+                self._give_up(self._meter.damaged - damaged, self._meter.counts.stale - stale)
             frame = link.receive(1e-9 * left_ns)
             if frame is not None:
                 newest = self._take(frame)
@@ -203,6 +208,7 @@ class DeviceBackend:
         if link.pending and newest.state == _RUN:  # the end of a run is not skipped
             newest = self._newest_after(newest)
         self._heard_ns = heard_ns
+        self._meter.heard(self._tick, heard_ns)
         return newest
 
     def _newest_after(self, newest: SampleReport) -> SampleReport:
@@ -212,7 +218,7 @@ class DeviceBackend:
                 break
             newer = self._take(frame)
             if newer is not None:
-                self.counters.skipped += 1
+                self._meter.counts.skipped += 1
                 newest = newer
         return newest
 
@@ -221,14 +227,16 @@ class DeviceBackend:
         try:
             message = unpack(frame, self._node)
         except CorruptFrameError:
-            self.counters.corrupt += 1
+            self._meter.counts.corrupt += 1
             return None
         if type(message) is SampleReport:
             return self._taken(message)
         if type(message) is FaultReport:
             self._fault = message.code
         elif type(message) is Health:
-            self.health = message
+            self._meter.take_health(message)
+        elif message is None and has_wrong_length(frame, self._node):
+            self._meter.counts.corrupt += 1
         return None
 
     def _taken(self, report: SampleReport) -> SampleReport | None:
@@ -238,10 +246,12 @@ class DeviceBackend:
         tick = nearest(last, raw_tick, 8)
         if tick <= last:
             if state == _RUN:
-                self.counters.stale += 1
+                self._meter.counts.stale += 1
                 return None
             tick = last + 1  # a device that was reset counts anew
-        self.counters.lost += tick - last - 1
+        self._meter.counts.lost += tick - last - 1
+        if state == _RUN:
+            self._meter.sample(report)
         self._tick = tick
         self._t = (tick - self._first_tick) * self._period
         if self._has_count:
@@ -263,12 +273,9 @@ class DeviceBackend:
             return report.fault_class
         return self._fault or Fault.UNKNOWN
 
-    def _give_up(self) -> None:
+    def _give_up(self, damaged: int, stale: int) -> NoReturn:
         self._link.send(pack(Stop(StopReason.NO_SAMPLE), self._node))
-        raise SampleTimeoutError(
-            f"{self._link.name}: no sample for {1e-6 * self._patience_ns:.0f} ms. The device's watchdog has "
-            "taken the amplifier to 0 V. Check cable and power of the device, then start again."
-        )
+        raise refusals.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
 
     def _leave(self, error: BaseException | None) -> None:
         """Say goodbye; after a trip, or where there is nobody to wait for, STOP."""
@@ -280,9 +287,7 @@ class DeviceBackend:
         if isinstance(error, TripError) and not error.orderly:
             caller.say(Stop(StopReason.SUPERVISOR))
         goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms)
-        if not goodbye.run(answered=self._answered == self._tick):
+        self.device_end = goodbye.run(answered=self._answered == self._tick)
+        if self.device_end is None:
             caller.say(Stop(StopReason.NO_SAMPLE))
-            raise LinkError(
-                f"{self._link.name}: the device did not confirm 0 V. Its watchdog acts after {self._ttl_ms} "
-                "ms without a command; look at the amplifier before you touch the arm."
-            )
+            raise refusals.not_confirmed(self._link.name, self._ttl_ms)

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.faults import name_of
 from dcmp_hil.wire.messages import Drive, State
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
     from dcmp_hil.clock import Clock
+    from dcmp_hil.wire.messages import SampleReport
 
 _LEAST = 3  # answers at 0 V
 _PATIENCE_NS = 250_000_000
 _AT_REST = (State.BOOT, State.IDLE, State.FAULT)
+
+
+class DeviceEnd(NamedTuple):
+    """How a device was left."""
+
+    state: str  # IDLE, FAULT ...
+    fault: str  # its name; empty without one
 
 
 class Goodbye:
@@ -34,8 +43,8 @@ class Goodbye:
         self._caller, self._clock = caller, clock
         self._session, self._ttl_ms = session, ttl_ms
 
-    def run(self, *, answered: bool) -> bool:
-        """Say goodbye; True if the device confirmed 0 V, disarmed.
+    def run(self, *, answered: bool) -> DeviceEnd | None:
+        """Say goodbye; None if the device did not confirm 0 V, disarmed.
 
         Parameters
         ----------
@@ -50,14 +59,19 @@ class Goodbye:
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             sample = self._caller.hear_sample(1e-9 * left_ns)
             if sample is None:
-                return False
+                return None
             confirmed = sample.state in _AT_REST and sample.voltage_mV == 0
             if confirmed and said >= _LEAST:
                 self._say(release=True)
-                return True
+                return DeviceEnd(State(sample.state).name, self._fault_of(sample))
             self._say(release=False)
             said += 1
-        return False
+        return None
+
+    def _fault_of(self, sample: SampleReport) -> str:
+        if sample.state != State.FAULT:
+            return ""
+        return name_of(self._caller.fault or sample.fault_class)
 
     def _say(self, *, release: bool) -> None:
         seq = self._caller.tick & 0x1FFF

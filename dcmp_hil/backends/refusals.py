@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import OpenError
+from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
 from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
@@ -101,4 +101,45 @@ def not_armed(name: str, state: str, seconds: float) -> OpenError:
     return OpenError(
         f"{name}: the device did not arm within {1e3 * seconds:.0f} ms and is in {state}. Commands may "
         "arrive too late (a slow adapter, a busy computer); `dcmp-hil monitor` shows what it counts."
+    )
+
+
+def no_sample(name: str, seconds: float, damaged: int, stale: int) -> SampleTimeoutError:
+    """Make the error for a device that is not heard any more; `damaged` and `stale` frames came meanwhile."""
+    said = f"{name}: no sample for {1e3 * seconds:.0f} ms"
+    zero = "The device's watchdog has taken the amplifier to 0 V."
+    if damaged:
+        return SampleTimeoutError(
+            f"{said}: all that arrived was damaged ({damaged} frames). {zero} Check cable, shield, ground "
+            "and termination, and the baud or bit rate, then start again."
+        )
+    if stale:
+        return SampleTimeoutError(
+            f"{said} that is new: {stale} came, with ticks that were there before. {zero} The device's clock "
+            "stands still, or two devices have one node; look at `dcmp-hil monitor`."
+        )
+    return SampleTimeoutError(f"{said}. {zero} Check cable and power of the device, then start again.")
+
+
+def stood_still(name: str, seconds: float) -> LinkError:
+    """Make the error for a computer that slept through the device's watchdog."""
+    return LinkError(
+        f"{name}: this computer stood still for {seconds:.2f} s. The device's watchdog has taken the "
+        "amplifier to 0 V. Start again."
+    )
+
+
+def taken_over(name: str) -> LinkError:
+    """Make the error for a device that runs on the commands of another host."""
+    return LinkError(
+        f"{name}: the device runs, and not on this host's commands: it was not heard of for too long, and "
+        "another host has it now. End one of the two."
+    )
+
+
+def not_confirmed(name: str, ttl_ms: int) -> LinkError:
+    """Make the error for a device whose 0 V was not seen."""
+    return LinkError(
+        f"{name}: the device did not confirm 0 V. Its watchdog acts after {ttl_ms} ms without a command; "
+        "look at the amplifier before you touch the arm."
     )

@@ -39,6 +39,10 @@ class Terms:
         1000, signed by the amplifier's wiring.
     zero
         Count at which the arm hangs; None for where it is at the start.
+    boot_wait
+        s, for the first sample.
+    warn_share, warn_clock_share
+        Above which losses, and an error of the device's clock, are told.
     """
 
     node: int
@@ -50,6 +54,9 @@ class Terms:
     rad_per_count: float
     mV_per_V: float
     zero: int | None
+    boot_wait: float
+    warn_share: float
+    warn_clock_share: float
 
     @classmethod
     def of(cls, rig: Rig) -> Terms:
@@ -76,4 +83,7 @@ class Terms:
             rad_per_count=rig.encoder.sign * math.tau / counts,
             mV_per_V=1e3 * rig.amplifier.sign,
             zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
+            boot_wait=device.boot_wait_s,
+            warn_share=1e-2 * device.warn_percent,
+            warn_clock_share=1e-2 * device.warn_clock_percent,
         )

@@ -198,7 +198,8 @@ def _document(session: Session, options: Options, result: Result, ended_by: str)
         "version": __version__,
         "ended_by": ended_by,
         "dropped_periods": result.dropped,
-        "link": None if result.link is None else asdict(result.link),
+        "link": _link(result),
+        "device_end": result.device_end and result.device_end._asdict(),
         "overruns": result.overruns,
         "outliers": result.outliers,
         "motor_gain": result.motor_gain and result.motor_gain.document(),
@@ -218,3 +219,10 @@ def _write_json(target: str | None, document: dict[str, Any]) -> list[str]:
     except ConfigError as error:
         return [str(error)]
     return []
+
+
+def _link(result: Result) -> dict[str, Any] | None:
+    """Return the counters of a link, and what they mean."""
+    if result.link is None:
+        return None
+    return asdict(result.link) | {"warnings": [concern._asdict() for concern in result.link_concerns]}

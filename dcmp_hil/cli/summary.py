@@ -9,6 +9,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from dcmp_hil.wire.quality import DeviceCounters
+
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.session import Result
@@ -44,14 +46,49 @@ def _figures(result: Result) -> Table:
     ):
         table.add_row(what, value, unit)
     if result.link is not None:
-        link = result.link
-        others = f"{link.stale} late or twice, {link.skipped} skipped, {link.corrupt} damaged"
-        table.add_row("samples lost", str(link.lost), others)
+        for row in _link(result):
+            table.add_row(*row)
     if result.outliers:
         table.add_row("[yellow]wrong counts", str(result.outliers), "samples left out, as if they were lost")
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table
+
+
+def _link(result: Result) -> list[tuple[str, str, str]]:
+    """Return the rows of a link; what was warned of in yellow."""
+    link, causes = result.link, {concern.cause for concern in result.link_concerns}
+    assert link is not None  # noqa: S101 - the caller looked
+    device = link.device or DeviceCounters()
+    damaged = f"frames here, {_at_least(device, 'crc_errors')} at the device"
+    rows = [
+        (
+            _told("samples lost", {"samples_lost"} & causes),
+            str(link.lost),
+            f"{link.stale} late or twice, {link.skipped} skipped",
+        ),
+        (
+            _told("commands missed", {"commands_lost"} & causes),
+            str(link.missed),
+            f"periods, {link.late} late here",
+        ),
+        (_told("damaged", {"commands_damaged", "samples_damaged"} & causes), str(link.corrupt), damaged),
+    ]
+    if link.limited:
+        rows.append(("commands limited", str(link.limited), "clamped or slewed by the device"))
+    if link.clock_error is not None and "device_clock" in causes:
+        rows.append(("[yellow]device's clock", f"{1e2 * link.clock_error:+.2f}", "% fast"))
+    if result.device_end and result.device_end.fault:
+        rows.append(("[yellow]device's end", result.device_end.fault, "a fault of its own"))
+    return rows
+
+
+def _told(what: str, causes: set[str]) -> str:
+    return f"[yellow]{what}" if causes else what
+
+
+def _at_least(device: DeviceCounters, name: str) -> str:
+    return f"{getattr(device, name)}{' or more' if name in device.full else ''}"
 
 
 def _durations(result: Result) -> Table:

@@ -52,6 +52,12 @@ class Device(Traits, Section):
     """Number of the device on a shared bus."""
     watchdog_ms: Annotated[int, Field(ge=5, le=50)] = 20
     """The device goes to 0 V when it hears nothing valid for so long, ms."""
+    boot_wait_s: Annotated[float, Field(ge=0.5, le=60)] = 3.0
+    """How long a device may take from the opening of its port to its first sample, s: a board may boot."""
+    warn_percent: Annotated[float, Field(ge=0.01, le=100)] = 0.5
+    """A run warns when more of its samples or commands are lost or damaged, %."""
+    warn_clock_percent: Annotated[float, Field(ge=0.01, le=100)] = 0.5
+    """A run warns when the device's clock is further off this computer's, %."""
 
 
 class SimBoard(Device):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.values import Event
@@ -10,14 +9,16 @@ from dcmp_hil.values import Event
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-HOST = ("lost", "stale", "skipped", "corrupt")
+    from dcmp_hil.wire.quality import Concern, LinkCounters
+
+HOST = ("lost", "stale", "skipped", "corrupt", "missed", "limited", "late")
 """Counters of the host's side, in the order in which they are told."""
 DEVICE = ("crc_errors", "sequence_gaps", "ring_overruns", "bus_offs", "late_ticks")
 """Counters of the device's side: HEALTH, which stop at 255."""
 
 
 class LinkWatch:
-    """Tells of a backend's counters.
+    """Tells of a backend's counters, and warns of what they mean.
 
     Parameters
     ----------
@@ -27,11 +28,18 @@ class LinkWatch:
         Between two times.
     tell
         Takes the event.
+
+    Attributes
+    ----------
+    concerns
+        What was warned of, each cause once, in the order of time.
     """
 
     def __init__(self, backend: Any, periods: int, tell: Callable[[Event], None]) -> None:
+        self.concerns: dict[str, Concern] = {}
         self._backend, self._periods, self._tell = backend, periods, tell
         self._left = periods if hasattr(backend, "counters") else 0
+        self._before: LinkCounters | None = None
 
     def look(self, t: float) -> None:
         """Take the device time of a period, s."""
@@ -39,11 +47,37 @@ class LinkWatch:
         if not self._left:
             self._left = self._periods
             self._tell(Event(t, "LINK", in_text(self._backend)))
+            self._judge(t)
+
+    def finish(self, t: float) -> None:
+        """Judge the whole run, which ends at a device time (s)."""
+        if hasattr(self._backend, "counters"):
+            self._before = None
+            self._judge(t)
+            judge = getattr(self._backend, "concerns", None)
+            for concern in judge(self._backend.counters) if judge else ():
+                self.concerns[concern.cause] = concern
+
+    def _judge(self, t: float) -> None:
+        """Warn of what the newest second shows, and the run so far."""
+        judge = getattr(self._backend, "concerns", None)
+        if judge is None:
+            return
+        counters = self._backend.counters
+        found = judge(counters)
+        if self._before is not None:
+            found += judge(counters.since(self._before))
+        self._before = counters
+        for concern in found:
+            if concern.cause not in self.concerns:
+                self.concerns[concern.cause] = concern
+                self._tell(Event(t, "WARN", concern.text))
 
 
 def in_text(backend: Any) -> str:
     """Return the counters of both sides, those of the device as far as it told them."""
-    counters: dict[str, int] = asdict(backend.counters)
+    told = backend.counters
+    counters: dict[str, int] = {name: getattr(told, name) for name in HOST}
     health = getattr(backend, "health", None)
     if health is not None:
         counters |= {name: getattr(health, name) for name in DEVICE}

@@ -69,7 +69,8 @@ class Recorder:
         self._truth = truth
         self._now = aligner.now
         self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model)
-        self._look_at_link = LinkWatch(backend, 1, self.event).look
+        self.link = LinkWatch(backend, 1, self.event)
+        self._look_at_link = self.link.look
         self._every = self._left = min(recent, _IN_LINE)  # periods until what is done now and then
         self._in_line = in_line
         self._service = Service(self._audience) if sinks and not in_line else None

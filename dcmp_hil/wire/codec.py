@@ -171,3 +171,10 @@ def unpack(frame: Frame, node: int = 0) -> Message | None:
         raise CorruptFrameError(f"frame {number:03X}#{data.hex().upper()}: its crc8 is wrong")
     message: Message = from_bytes(data)
     return message
+
+
+def has_wrong_length(frame: Frame, node: int = 0) -> bool:
+    """Whether a frame is ours by node and number, and not by its length: damage, or another version."""
+    number, data = frame
+    length, _ = _UNPACK.get(number >> 4, _UNKNOWN)
+    return number & 0xF == node and 0 < length != len(data)

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.backends.device import LinkCounters
 from dcmp_hil.model import Model
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
@@ -18,6 +17,7 @@ from dcmp_hil.telemetry.link import DEVICE, HOST, LinkWatch, counters
 from dcmp_hil.telemetry.portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns
 from dcmp_hil.wire.messages import Health
+from dcmp_hil.wire.quality import LinkCounters
 from tests.telemetry.runs import blocks
 
 if TYPE_CHECKING:

@@ -1,0 +1,56 @@
+"""The device's clock against this computer's, from the instants at which samples arrive."""
+
+from __future__ import annotations
+
+from statistics import median
+
+_WINDOW = 256  # ticks
+_FEWEST, _MOST = 4, 512  # slopes: fewer say nothing, more would add nothing
+
+
+class ClockRatio:
+    """How fast the device's clock goes.
+
+    A sample may arrive late and never early, so the earliest arrival of a window of 256 ticks shows the
+    shortest delay of the line. How that moves from window to window is the error of the clock; the median
+    over windows leaves out those in which this computer stood still.
+
+    Parameters
+    ----------
+    period_ns
+        ns, nominal, of a tick.
+    """
+
+    def __init__(self, period_ns: float) -> None:
+        self._period_ns = period_ns
+        self._ends = 0
+        self._earliest = 0.0  # ns, arrival after the nominal instant: the smallest of this window
+        self._tick = 0  # at which it was
+        self._before: tuple[int, float] | None = None  # the same of the window before
+        self._slopes: list[float] = []
+
+    def add(self, tick: int, heard_ns: int) -> None:
+        """Take a sample's tick, and the instant of its arrival."""
+        offset = heard_ns - tick * self._period_ns
+        if tick >= self._ends:
+            self._close_window(tick)
+            self._earliest, self._tick = offset, tick
+        elif offset < self._earliest:
+            self._earliest, self._tick = offset, tick
+
+    @property
+    def error(self) -> float | None:
+        """How much the device's clock is fast, as a share: -0.02 is 2 % slow; None before it is known."""
+        if len(self._slopes) < _FEWEST:
+            return None
+        longer = median(self._slopes)  # a nominal period takes so much longer than it should
+        return 1.0 / (1.0 + longer) - 1.0
+
+    def _close_window(self, tick: int) -> None:
+        if self._ends and len(self._slopes) < _MOST:
+            if self._before is not None:
+                apart = self._tick - self._before[0]
+                if apart > 0:
+                    self._slopes.append((self._earliest - self._before[1]) / (apart * self._period_ns))
+            self._before = self._tick, self._earliest
+        self._ends = tick + _WINDOW

@@ -1,0 +1,85 @@
+"""What is counted of a link while a device runs on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dcmp_hil.backends.clock_ratio import ClockRatio
+from dcmp_hil.wire.quality import LinkCounters, growth
+
+if TYPE_CHECKING:
+    from dcmp_hil.backends.link import Link
+    from dcmp_hil.wire.messages import Health, SampleReport
+
+_LATE = 0.5  # of a period
+
+
+class LinkMeter:
+    """Counts what is lost, late and damaged, from arming on.
+
+    Parameters
+    ----------
+    link
+        Counts the damage that it sees itself.
+    period_ns
+        ns, nominal.
+
+    Attributes
+    ----------
+    counts
+        What the backend counts; without the link's own damage, see `counters`.
+    health
+        The newest HEALTH, as the device sent it.
+    """
+
+    def __init__(self, link: Link, period_ns: float) -> None:
+        self.counts = LinkCounters()
+        self.health: Health | None = None
+        self._link, self._period_ns, self._late_ns = link, period_ns, _LATE * period_ns
+        self._first_health: Health | None = None
+        self._damaged_before = 0
+        self._clock = ClockRatio(period_ns)
+        self._heard_ns, self._tick = 0, 0
+
+    def start(self, tick: int, now_ns: int, health: Health | None) -> None:
+        """Begin: what the link counted until now was before the run; `health` is the newest heard so far."""
+        self.health = self._first_health = health
+        self._damaged_before = self._link.corrupt
+        self._heard_ns, self._tick = now_ns, tick
+
+    def sample(self, report: SampleReport) -> None:
+        """Count a new SAMPLE of a device in RUN."""
+        counts = self.counts
+        counts.samples += 1
+        counts.missed += report.missed
+        counts.limited += report.limited
+
+    def heard(self, tick: int, now_ns: int) -> None:
+        """Take the tick of the SAMPLE that is about to be answered, and when it was fetched, ns."""
+        gone_ns = now_ns - self._heard_ns - (tick - self._tick) * self._period_ns
+        self.counts.late += gone_ns > self._late_ns
+        self._heard_ns, self._tick = now_ns, tick
+        self._clock.add(tick, now_ns)
+
+    def answered(self, now_ns: int) -> None:
+        """Take when the command went out, ns: one that took a period comes too late."""
+        self.counts.late += now_ns - self._heard_ns > self._late_ns
+
+    def take_health(self, health: Health) -> None:
+        """Keep a HEALTH."""
+        self.health = health
+        if self._first_health is None:
+            self._first_health = health
+
+    @property
+    def damaged(self) -> int:
+        """Frames that arrived damaged so far."""
+        return self.counts.corrupt + self._link.corrupt - self._damaged_before
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Everything that was counted so far; a copy."""
+        first, last = self._first_health, self.health
+        device = None if first is None or last is None or first is last else growth(first[:5], last[:5])
+        return replace(self.counts, corrupt=self.damaged, device=device, clock_error=self._clock.error)
