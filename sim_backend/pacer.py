@@ -23,12 +23,18 @@ class Pacer:
 
     def __init__(self, clock: Clock, period: float) -> None:
         self._clock = clock
+        self._tick = 0  # the one that was waited for last
         self._period_ns = 1e9 * period
         self._start_ns = clock.now_ns()
 
     def start(self) -> None:
         """Make this instant that of tick 0."""
         self._start_ns = self._clock.now_ns()
+
+    def stretch(self, factor: float) -> None:
+        """Let a period last `factor` times as long from the newest tick on."""
+        before, self._period_ns = self._period_ns, factor * self._period_ns
+        self._start_ns += int(self._tick * (before - self._period_ns))
 
     def missed(self, tick: int) -> int:
         """Count the ticks after `tick` whose instants have passed as well."""
@@ -37,6 +43,7 @@ class Pacer:
 
     def wait_for(self, tick: int) -> None:
         """Return no earlier than the instant of `tick`."""
+        self._tick = tick
         deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
         self._clock.sleep_until_ns(deadline_ns)
         behind_ns = self._clock.now_ns() - deadline_ns

@@ -19,6 +19,10 @@ class Plant(Protocol):
         """Hold `voltage` (V) for one period and return the state at its end."""
         ...
 
+    def stretch(self, factor: float) -> None:
+        """Let a period last `factor` times as long."""
+        ...
+
 
 class MoreauPlant:
     """Coulomb friction as a set, time-stepped after Moreau (Acary and Brogliato 2008).
@@ -64,6 +68,10 @@ class MoreauPlant:
         self._periods += 1
         return Truth(x1, x2, (x2 - before) / h + self._f0 * before - self._ku * voltage)
 
+    def stretch(self, factor: float) -> None:
+        """Let a period last `factor` times as long."""
+        self._step *= factor
+
 
 class EulerPlant:
     """The paper's own simulation: explicit Euler, friction by a sign that chatters at rest.
@@ -94,6 +102,10 @@ class EulerPlant:
         self._x1, self._x2 = x1, x2
         now = self._disturbance(x1, x2, self._done * h)
         return Truth(x1, x2, now + (self._f0 - f0) * x2 + (ku - self._ku) * voltage)
+
+    def stretch(self, factor: float) -> None:
+        """Let a period last `factor` times as long."""
+        self._step *= factor
 
     def _disturbance(self, x1: float, x2: float, t: float) -> float:
         """Return w of eq. (2), rad/s2."""

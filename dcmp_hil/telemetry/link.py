@@ -51,12 +51,13 @@ class LinkWatch:
 
     def finish(self, t: float) -> None:
         """Judge the whole run, which ends at a device time (s)."""
-        if hasattr(self._backend, "counters"):
-            self._before = None
-            self._judge(t)
-            judge = getattr(self._backend, "concerns", None)
-            for concern in judge(self._backend.counters) if judge else ():
-                self.concerns[concern.cause] = concern
+        judge = getattr(self._backend, "concerns", None)
+        if judge is None or not self._backend.counters.samples:  # it never began
+            return
+        self._before = None
+        self._judge(t)
+        for concern in judge(self._backend.counters):
+            self.concerns[concern.cause] = concern
 
     def _judge(self, t: float) -> None:
         """Warn of what the newest second shows, and the run so far."""

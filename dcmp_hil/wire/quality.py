@@ -117,7 +117,8 @@ def _losses(counters: LinkCounters) -> list[tuple[str, int, str]]:
         ("commands_lost", 0 if damaged_up else unheard, _COMMANDS),
         ("commands_damaged", max(device.crc_errors, unheard if damaged_up else 0), _DAMAGED_UP),
         ("samples_damaged", counters.corrupt, _DAMAGED_DOWN),
-        ("samples_lost", max(0, counters.lost - counters.corrupt), _SAMPLES),
+        # Where the end of a frame is damaged it takes the next one along.
+        ("samples_lost", max(0, counters.lost - 2 * counters.corrupt), _SAMPLES),
         ("line_too_slow", device.ring_overruns, _BLOCKED),
         ("device_late", device.late_ticks, _LATE),
     ]

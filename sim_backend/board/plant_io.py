@@ -51,6 +51,10 @@ class PlantIO:
         plant, encoder = self._healthy
         self._plant, self._encoder = faults.plant(plant), faults.encoder(encoder)
 
+    def stretch(self, factor: float) -> None:
+        """Let what the board calls a period last `factor` times as long."""
+        self._plant.stretch(factor)
+
     def count(self) -> int:
         """Return what the encoder's counter shows, 32 bits."""
         return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _WORD

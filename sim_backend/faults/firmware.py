@@ -12,7 +12,7 @@ from sim_backend.faults.base import FaultModel, Kind, Number
 from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
@@ -33,6 +33,25 @@ class Reset(FaultModel):
         if board is not None and not self._done:
             board.reset()
         self._done = True
+
+
+class WrongClock(FaultModel):
+    """The device's clock is off: what it calls a period is shorter or longer."""
+
+    stretch: Callable[[float], None] = staticmethod(lambda _: None)
+    """Of pace and plant; put in by the injector."""
+
+    def begin(self) -> None:
+        """Go at the wrong rate."""
+        self.stretch(1.0 / self._rate)
+
+    def end(self) -> None:
+        """Go right again."""
+        self.stretch(self._rate)
+
+    @property
+    def _rate(self) -> float:
+        return 1.0 + 1e-2 * self.number("percent")
 
 
 class RogueHost(FaultModel):
@@ -126,6 +145,12 @@ FIRMWARE = {
         wired=True,
     ),
     "firmware.version": Kind(OtherVersion, "the device speaks another protocol", wired=True),
+    "firmware.clock": Kind(
+        WrongClock,
+        "the device's clock is fast, or slow where it is negative",
+        {"percent": Number("%", -50, 100, 2)},
+        wired=True,
+    ),
     "firmware.start": Kind(
         Start,
         "the device boots with its counters here",

@@ -10,7 +10,7 @@ from dcmp_hil.values import UNKNOWN_TRUTH
 from sim_backend.board.board import Board
 from sim_backend.faults.base import FaultContext
 from sim_backend.faults.faulty_link import FaultyLink
-from sim_backend.faults.firmware import Start
+from sim_backend.faults.firmware import Start, WrongClock
 from sim_backend.faults.host import HostFault
 from sim_backend.faults.listener import FaultListener
 from sim_backend.faults.plant import FaultyEncoder, FaultyPlant, PlantFault
@@ -154,6 +154,9 @@ class Injector:
         link = FaultyLink(board, carrier, pacer, self)
         for effect in self._host:
             effect.elapse = lambda seconds: link.elapse(round(seconds / self._facts.period))
+        for clock in (timer.effect for timer in self.timers):
+            if isinstance(clock, WrongClock):
+                clock.stretch = lambda factor: (pace.stretch(factor), board.pins.stretch(factor))
         self.listener.attached(board)
         self._look()
         return link

@@ -67,6 +67,10 @@ class FaultyPlant:
         self.truth = truth._replace(disturbance=truth.disturbance + ku * (seen - voltage))
         return self.truth
 
+    def stretch(self, factor: float) -> None:
+        """Let a period last `factor` times as long."""
+        self._plant.stretch(factor)
+
 
 class FaultyEncoder(Encoder):
     """An encoder whose count something happens to.

@@ -95,6 +95,18 @@ class Flip(Lucky):
         return (bytes(changed),)
 
 
+class Noise(WireFault):
+    """Turns every bit over with the same small probability, those of a delimiter too."""
+
+    def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
+        """Turn some over."""
+        changed, rate = bytearray(piece), self.number("rate")
+        for place in range(8 * len(piece)):
+            if self.rng.random() < rate:
+                changed[place // 8] ^= 1 << place % 8
+        return (bytes(changed),)
+
+
 class Truncate(Lucky):
     """Loses the last bytes of a piece, its delimiter first: two pieces merge."""
 
@@ -226,6 +238,12 @@ WIRE = {
         Flip,
         "bits are turned over",
         {"p": _probability(0.02), "bits": Number("bits", 1, 3, 1), "way": _WAY},
+        wired=True,
+    ),
+    "wire.noise": Kind(
+        Noise,
+        "bits are turned over, each with `rate`",
+        {"rate": _probability(0.001), "way": _WAY},
         wired=True,
     ),
     "wire.truncate": Kind(
