@@ -251,6 +251,8 @@ class Session:
         device = getattr(line.backend, "described", "")
         if device:
             recorder.event(Event(0.0, "INFO", f"device: {device}"))
+        for remark in getattr(line.backend, "remarks", ()):
+            recorder.event(Event(0.0, "WARN", remark))
         t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
         if self.rig.run.end == "lower" and not self.stop.requested:
             recorder.event(Event(t, "INFO", "lowering the arm"))

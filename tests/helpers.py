@@ -96,6 +96,9 @@ class PlantSees:
     def advance(self, voltage: float) -> Truth:
         return self._plant.advance(self._changed(voltage))
 
+    def stretch(self, factor: float) -> None:
+        self._plant.stretch(factor)
+
 
 class FaultySim(SimBackend):
     """The simulated rig with a fault from `fault_at(rig)` on, drawn by `sim.seed`."""

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
+from dcmp_hil.backends.tick_watch import TickWatch
+from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.counters import nearest
-from dcmp_hil.wire.messages import FaultReport, Health, Parameter, ParameterValue, SampleReport
+from dcmp_hil.wire.messages import (
+    FaultReport,
+    Health,
+    Identity,
+    Parameter,
+    ParameterValue,
+    SampleReport,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,10 +30,22 @@ _Answer = TypeVar("_Answer")
 MOST_WAITING = 512  # frames that are skipped for a newer one; a peer that floods is no reason to stay
 REPEAT = 0.05  # s, after which a question is asked again
 PATIENCE = 0.5  # s, for an answer in all
+_UNDER_WAY = 0.5  # s: a slow line may bring the first answer only now
+LONGEST_TRIP = 0.4  # s, for the answer to a question that is asked once
+
+
+class _Owed(NamedTuple):
+    """Answers that are still to come to a question that was asked more than once."""
+
+    count: int
+    until_ns: int
 
 
 class Caller:
     """One side of a conversation with one device.
+
+    Answers carry no number. A question of a kind is asked again only when the answers to those before have
+    come, or can come no more: no answer is taken for that to another question.
 
     Parameters
     ----------
@@ -44,8 +65,11 @@ class Caller:
         self.tick = tick  # of it; whole once PARAMETER_VALUE(TICK) was heard
         self.fault = 0  # code of the last fault heard of
         self.health: Health | None = None  # the newest
-        self.foreign = 0  # frames that are not this device's
-        self.corrupt = 0  # frames whose crc8 was wrong
+        self.heard: Counter[str] = Counter()  # messages of this device, by kind
+        self.nodes: set[int] = set()  # others that were heard
+        self.corrupt = 0  # frames whose length or crc8 was wrong
+        self.ticks = TickWatch()
+        self._owed: dict[object, _Owed] = {}
 
     def say(self, message: Message) -> None:
         """Send a message."""
@@ -77,9 +101,7 @@ class Caller:
 
     def listen(self, seconds: float) -> None:
         """Hear whatever comes for so long."""
-        deadline_ns = self._clock.now_ns() + int(1e9 * seconds)
-        while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            self.hear(1e-9 * left_ns)
+        self._listen_until(self._clock.now_ns() + int(1e9 * seconds))
 
     def hear_sample(self, timeout: float) -> SampleReport | None:
         """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
@@ -96,12 +118,54 @@ class Caller:
         self, question: Message, answer: type[_Answer], fits: Callable[[_Answer], bool] = lambda _: True
     ) -> _Answer | None:
         """Ask, and ask again, until an answer of that type fits; None if none came in time."""
+        key = _key_of_answer(question)
+        self._await_owed(key)
         for _ in range(round(PATIENCE / REPEAT)):
-            self.say(question)
+            self._ask_once(question, key)
             found = self._until(REPEAT, answer, fits)
             if found is not None:
-                return found
-        return None
+                break
+        else:
+            found = self._until(_UNDER_WAY, answer, fits)
+        self._let_owed_come(key)
+        return found
+
+    def time_answer(
+        self, question: Message, answer: type[_Answer], fits: Callable[[_Answer], bool] = lambda _: True
+    ) -> float | None:
+        """Ask once; return how long the answer took, s, or None if none came within 0.4 s."""
+        key = _key_of_answer(question)
+        self._await_owed(key)
+        began_ns = self._clock.now_ns()
+        self._ask_once(question, key)
+        found = self._until(LONGEST_TRIP, answer, fits)
+        self._let_owed_come(key)
+        return None if found is None else 1e-9 * (self._clock.now_ns() - began_ns)
+
+    def _ask_once(self, question: Message, key: object) -> None:
+        owed = self._owed.get(key, _Owed(0, 0))
+        self._owed[key] = owed._replace(count=owed.count + 1)
+        self.say(question)
+
+    def _await_owed(self, key: object) -> None:
+        """Hear late answers to earlier questions of the same kind."""
+        while (owed := self._owed.get(key)) is not None:
+            left_ns = owed.until_ns - self._clock.now_ns()
+            if owed.count <= 0 or left_ns <= 0:
+                break
+            self.hear(1e-9 * left_ns)
+        self._owed.pop(key, None)
+
+    def _let_owed_come(self, key: object) -> None:
+        """Answers follow one another as their questions did, 50 ms apart."""
+        owed = self._owed.pop(key, None)
+        if owed is not None and owed.count > 0:
+            until_ns = self._clock.now_ns() + int(1e9 * REPEAT * (owed.count + 1))
+            self._owed[key] = _Owed(owed.count, until_ns)
+
+    def _listen_until(self, deadline_ns: int) -> None:
+        while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
+            self.hear(1e-9 * left_ns)
 
     def _understand(self, frame: Frame) -> Message | None:
         try:
@@ -110,16 +174,39 @@ class Caller:
             self.corrupt += 1
             return None
         if message is None:
-            self.foreign += 1
-        elif isinstance(message, SampleReport):
+            self._note_foreign(frame)
+        else:
+            self.heard[type(message).__name__] += 1
+            self._note(message)
+        return message
+
+    def _note(self, message: Message) -> None:
+        """Keep what a message tells."""
+        if isinstance(message, SampleReport):
             self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
+            self.ticks.add(message)
         elif isinstance(message, FaultReport):
             self.fault = message.code
         elif isinstance(message, Health):
             self.health = message
-        elif isinstance(message, ParameterValue) and message.id == Parameter.TICK:
-            self.tick = message.value
-        return message
+        elif isinstance(message, ParameterValue):
+            if message.id == Parameter.TICK:
+                self.tick = message.value
+            self._note_answer(ParameterValue, message.id)
+        elif isinstance(message, Identity):
+            self._note_answer(Identity)
+
+    def _note_answer(self, *key: object) -> None:
+        owed = self._owed.get(key)
+        if owed is not None:
+            self._owed[key] = owed._replace(count=owed.count - 1)
+
+    def _note_foreign(self, frame: Frame) -> None:
+        number, _ = frame
+        if has_wrong_length(frame, self._node):
+            self.corrupt += 1
+        elif number & 0xF != self._node:
+            self.nodes.add(number & 0xF)
 
     def _until(self, timeout: float, kind: type[_Answer], fits: Callable[[_Answer], bool]) -> _Answer | None:
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
@@ -128,3 +215,9 @@ class Caller:
             if isinstance(message, kind) and fits(message):
                 return message
         return None
+
+
+def _key_of_answer(question: Message) -> tuple[object, ...]:
+    """Return what an answer to a question has in common with it."""
+    parameter = getattr(question, "id", None)
+    return (Identity,) if parameter is None else (ParameterValue, parameter)

@@ -78,8 +78,15 @@ class CanLink:
 
     @property
     def corrupt(self) -> int:
-        """What arrived so far and was no frame; most interfaces keep that to themselves."""
+        """What arrived so far and was no frame: lines of slcan, error frames of socketcan and some others."""
         return self._bus.corrupt if isinstance(self._bus, SlcanBus) else self._corrupt
+
+    @property
+    def other_carrier(self) -> str:
+        """Settings for COBS, if that is what an slcan port was heard to speak."""
+        if not (isinstance(self._bus, SlcanBus) and self._bus.is_cobs):
+            return ""
+        return f"--set backend.kind=serial --set backend.port={self._settings.channel}"
 
     @property
     def pending(self) -> bool:
@@ -164,6 +171,7 @@ class CanLink:
                 if message is None:
                     return None
                 if message.is_error_frame:
+                    self._corrupt += 1
                     self._check_bus(message)
                 elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
                     return message.arbitration_id, bytes(message.data)

@@ -76,7 +76,9 @@ class DeviceBackend:
         self._answered = 0  # tick of the SAMPLE that was answered last
         self._meter = LinkMeter(link, 1e9 * rig.period)
         self._rates = terms.warn_share, terms.warn_clock_share
-        self.firmware = ""
+        self.firmware = self._cleared = ""
+        self.remarks: tuple[str, ...] = ()
+        """What a person should know of this device, once it is open."""
         self.device_end: DeviceEnd | None = None  # how it was left, as far as it said so
 
     def __enter__(self) -> Self:
@@ -97,6 +99,7 @@ class DeviceBackend:
             self._link.close()
             raise
         self._session, self.firmware = greeting.session, greeting.firmware
+        self._cleared, self.remarks = greeting.cleared, greeting.remarks
         self._tick = greeting.tick
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
@@ -147,7 +150,9 @@ class DeviceBackend:
     @property
     def described(self) -> str:
         """What the device says it is, once it is open."""
-        return f"{self._link.name}, node {self._node}, firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
+        cleared = f", its fault {self._cleared} was cleared" if self._cleared else ""
+        firmware = f"firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
+        return f"{self._link.name}, node {self._node}, {firmware}{cleared}"
 
     def read(self) -> Sample:
         """Wait for the next SAMPLE and return the newest.

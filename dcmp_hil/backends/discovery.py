@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from dcmp_hil.backends.caller import Caller
 from dcmp_hil.backends.links import make_link
+from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.faults import name_of
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
 
-_LISTEN = 0.25  # s; a device sends every period, from boot on
+LISTEN = 0.25  # s; a device sends every period, from boot on
 _TICKS = 256
 _OTHER = 7  # fault class of every code from 7 on
 _ASKS_ONLY = 0  # the session of a HELLO that owns nothing
@@ -53,7 +54,9 @@ class Finding:
     device: str
 
 
-def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) -> Iterator[Finding]:
+def find_devices(
+    extra: Sequence[str], baud: int, bitrate: int, clock: Clock, wait: float = LISTEN
+) -> Iterator[Finding]:
     """Look at every serial port and CAN channel, and at ports named besides.
 
     It listens first, and writes nothing: it asks only where a device of ours was heard. Other people's
@@ -67,6 +70,8 @@ def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) ->
         Bit/s, of serial ports and CAN buses.
     clock
         Times the listening.
+    wait
+        s, how long a device may take to its first sample.
 
     Raises
     ------
@@ -78,10 +83,10 @@ def find_devices(extra: Sequence[str], baud: int, bitrate: int, clock: Clock) ->
     for path, description in _serial_ports(extra):
         cobs = Serial(kind="serial", port=path, baud=baud)
         slcan = Can(kind="can", interface="slcan", channel=path, baud=baud, bitrate=bitrate)
-        yield from _look_at(path, description, (cobs, slcan), clock)
+        yield from _look_at(path, description, (cobs, slcan), clock, wait)
     for interface, channel in _can_channels():
         settings = Can(kind="can", interface=interface, channel=channel, bitrate=bitrate)
-        yield from _look_at(f"{interface} {channel}", "CAN", (settings,), clock)
+        yield from _look_at(f"{interface} {channel}", "CAN", (settings,), clock, wait)
 
 
 def _check_name(path: str) -> None:
@@ -118,12 +123,14 @@ def _can_channels() -> Iterator[tuple[str, str]]:
         yield config["interface"], str(config["channel"])
 
 
-def _look_at(place: str, description: str, ways: Sequence[Serial | Can], clock: Clock) -> Iterator[Finding]:
+def _look_at(
+    place: str, description: str, ways: Sequence[Serial | Can], clock: Clock, wait: float
+) -> Iterator[Finding]:
     """Try one way of speaking after the other, until a device is heard."""
     damaged = False
     try:
         for settings in ways:
-            devices, corrupt = _ask(settings, clock)
+            devices, corrupt = _ask(settings, clock, wait)
             damaged = damaged or corrupt
             for node, words in devices.items():
                 yield Finding(place, description, _keys(settings, node), words)
@@ -145,22 +152,29 @@ def _keys(settings: Serial | Can, node: int) -> tuple[str, ...]:
     return tuple(f"{key}={values[key]}" for key in named)
 
 
-def _ask(settings: Serial | Can, clock: Clock) -> tuple[dict[int, str], bool]:
+def _ask(settings: Serial | Can, clock: Clock, wait: float) -> tuple[dict[int, str], bool]:
     """Return the devices at the other end, in words, and whether damaged frames came."""
     link = make_link(settings, clock)
     try:
         link.open()
-        nodes = _hear_nodes(Caller(link, clock, 0), clock)
-        return {node: _describe(Caller(link, clock, node), node) for node in nodes}, link.corrupt > 0
+        nodes = _hear_nodes(Caller(link, clock, 0), clock, wait)
+        found = {
+            node: _describe(Caller(link, clock, node), node, twice=twice) for node, twice in nodes.items()
+        }
+        return found, link.corrupt > 0
     finally:
         link.close()
 
 
-def _hear_nodes(caller: Caller, clock: Clock) -> list[int]:
-    """Return the nodes that were heard: two SAMPLEs, one tick after the other, are no accident."""
-    deadline_ns = clock.now_ns() + int(1e9 * _LISTEN)
+def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
+    """Return the nodes that were heard, and whether each is there twice.
+
+    Two SAMPLEs, one tick after the other, are no accident; `wait` (s) is for the first.
+    """
+    deadline_ns = clock.now_ns() + int(1e9 * wait)
     ticks: dict[int, int] = {}
-    nodes = set()
+    nodes: set[int] = set()
+    watches: dict[int, TickWatch] = {}
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
         heard = caller.overhear(1e-9 * left_ns)
         if heard is None:
@@ -169,15 +183,21 @@ def _hear_nodes(caller: Caller, clock: Clock) -> list[int]:
         if not isinstance(sample, SampleReport):
             continue
         if ticks.get(node) == (sample.tick - 1) % _TICKS:
+            if not nodes:  # from the first on no longer than usual
+                deadline_ns = clock.now_ns() + int(1e9 * LISTEN)
             nodes.add(node)
         ticks[node] = sample.tick
-    return sorted(nodes)
+        watches.setdefault(node, TickWatch()).add(sample)
+    twice = {node for node, watch in watches.items() if watch.two_devices}
+    return {node: node in twice for node in sorted(nodes | twice)}
 
 
-def _describe(caller: Caller, node: int) -> str:
+def _describe(caller: Caller, node: int, *, twice: bool) -> str:
     identity = caller.ask(Hello(_ASKS_ONLY, PROTOCOL_HASH), Identity)
-    sample = caller.hear_sample(_LISTEN)
+    sample = caller.hear_sample(LISTEN)
     words = [f"node {node}"]
+    if twice:
+        words.append("TWO devices with this node (unplug one)")
     if identity is None:
         words.append("does not answer")
     else:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
-from dcmp_hil.errors import BackendError, ConfigError, DcmpError
-from dcmp_hil.faults import name_of
+from dcmp_hil.backends.clearing import Clearing
+from dcmp_hil.backends.comparison import COMPARED, differences, is_possible, remarks
+from dcmp_hil.errors import BackendError, ConfigError
 from dcmp_hil.wire.messages import (
     Drive,
     Hello,
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 _HELLOS, _TOLD = 5, 2
 _ROUND_TRIPS = 5
 _SLOWEST = 3e-3  # s: a command older than that is refused by the device
+_JOINS, _EARLY, _LATE = 3, -4, 32  # ticks that a SAMPLE may differ from what TICK said before it
+_HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
+_TWINS_S = 0.1
 
 
 class Greeting(NamedTuple):
@@ -42,6 +46,8 @@ class Greeting(NamedTuple):
     session: int
     tick: int  # of the newest SAMPLE, periods since the device's boot
     firmware: str
+    cleared: str  # name of a fault of an earlier run; empty for none
+    remarks: tuple[str, ...]  # what a person should know of this device
 
 
 class Handshake:
@@ -69,110 +75,124 @@ class Handshake:
         Raises
         ------
         OpenError
-            If nobody, somebody else's device, or another version answers, or it does not arm.
+            If nobody, somebody else's device, or another version answers, if what it says cannot be, or it
+            does not arm.
         ConfigError
             If the device is not what the rig says.
         """
         self._listen()
         firmware = self._introduce()
+        arming = False
         try:
-            self._compare()
             self._check_round_trip()
-            self._clear()
+            found = self._compare()
+            self._check_alone()
+            self._join_ticks()
+            cleared = self._clearing().run()
             self._set_limits()
+            self._join_ticks()
+            self._check_cold()
+            arming = True
             self._arm()
-        except DcmpError:
-            self._give_back()
+        except BaseException as error:  # Ctrl-C too
+            if arming and not isinstance(error, BackendError):
+                self._stop()
+            else:
+                self._give_back()
             raise
-        except BaseException:  # Ctrl-C: it may be armed by now
-            with contextlib.suppress(BackendError):
-                self._caller.say(Stop(StopReason.PERSON))
-            raise
-        return Greeting(self._session, self._caller.tick, firmware)
+        return Greeting(self._session, self._caller.tick, firmware, cleared, tuple(found))
+
+    def _stop(self) -> None:
+        """Leave nothing armed."""
+        with contextlib.suppress(BackendError):
+            self._caller.say(Stop(StopReason.PERSON))
 
     def _give_back(self) -> None:
         """Release the session, so that whoever tries next need not wait until it lapses."""
         with contextlib.suppress(BackendError):
-            self._join_ticks()
+            self._get(Parameter.TICK)
             self._say(release=True)
 
     def _listen(self) -> None:
-        caller = self._caller
-        if caller.hear_sample(PATIENCE) is not None:
+        caller, wait = self._caller, self._terms.boot_wait
+        if caller.hear_sample(wait) is not None:
             return
+        name = self._link.name
+        if caller.heard:
+            raise refusals.no_samples(name, wait, " and ".join(kind.upper() for kind in sorted(caller.heard)))
+        if caller.nodes:
+            raise refusals.other_node(name, self._terms.node, caller.nodes)
         if self._link.corrupt or caller.corrupt:
-            raise refusals.only_damage(self._link.name)
-        if caller.foreign:
-            raise refusals.other_node(self._link.name, self._terms.node)
-        raise refusals.silence(self._link.name, PATIENCE)
+            raise refusals.only_damage(name, self._link.other_carrier)
+        raise refusals.silence(name, wait)
 
     def _introduce(self) -> str:
         """Become the owner, and be told so twice: on a bus an IDENTITY may be the answer to somebody else."""
-        told = 0
+        told, identity = 0, None
         for _ in range(_HELLOS):
             identity = self._caller.ask(Hello(self._session, PROTOCOL_HASH), Identity)
             if identity is None:
                 raise refusals.deaf(self._link.name)
             firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
-            if identity.mismatch or identity.protocol_hash != PROTOCOL_HASH:
-                raise refusals.other_protocol(self._link.name, firmware, identity.protocol_hash)
-            if identity.owned and not identity.busy:
+            self._check_identity(identity, firmware)
+            if identity.owned and not identity.mismatch:
                 told += 1
             else:
                 told = 0
                 self._caller.listen(1e-3 * (5 + secrets.randbelow(20)))
             if told == _TOLD:
                 return firmware
+        self._check_alone()
+        if identity is not None and identity.mismatch:
+            raise refusals.impossible(self._link.name, "that this host's protocol is not its own; it is")
         raise refusals.owned(self._link.name)
 
-    def _compare(self) -> None:
-        """Hold the rig against the device; every difference at once."""
-        terms = self._terms
-        counts = self._get(Parameter.COUNTS_PER_REV)
-        rate_hz, allowed_V = (
-            1e6 / self._get(Parameter.PERIOD_US),
-            1e-3 * self._get(Parameter.VOLTAGE_LIMIT_MV),
-        )
-        asked_hz, asked_V = 1e6 / terms.period_us, 1e-3 * terms.voltage_limit_mV
-        faults = []
-        if counts != terms.counts_per_rev:
-            faults.append(
-                f"encoder.counts_per_rev: the rig says {terms.counts_per_rev}, the device {counts}. "
-                "Correct the rig, or build the firmware for this encoder."
-            )
-        if rate_hz != asked_hz:
-            faults.append(
-                f"loop.rate_hz: the rig says {asked_hz:g}, the device {rate_hz:g}. "
-                "Correct the rig, or build the firmware for this rate."
-            )
-        if allowed_V < asked_V:
-            faults.append(
-                f"amplifier.voltage_limit_V: the rig says {asked_V:g}, the device allows {allowed_V:g}. "
-                "Lower it in the rig."
-            )
+    def _check_identity(self, identity: Identity, firmware: str) -> None:
+        name = self._link.name
+        if identity.protocol_hash != PROTOCOL_HASH:
+            raise refusals.other_protocol(name, firmware, identity.protocol_hash)
+        if identity.owned and identity.busy:
+            raise refusals.impossible(name, "that this host owns it and another one does")
+
+    def _compare(self) -> list[str]:
+        """Hold the rig against the device, every difference at once; return what is worth a remark."""
+        found = {parameter: self._get(parameter) for parameter in COMPARED}
+        faults = differences(self._terms, found)
         if faults:
             raise ConfigError(*faults)
+        return remarks(self._terms, found)
 
     def _check_round_trip(self) -> None:
-        """Refuse a USB adapter that collects bytes for 16 ms: every command would be too old."""
-        best = min(self._round_trip() for _ in range(_ROUND_TRIPS))
-        if best > _SLOWEST + 1e-6 * self._terms.period_us:
+        """Refuse a line on which every command would be too old: a USB adapter may collect bytes."""
+        trips = [
+            self._caller.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
+            for _ in range(_ROUND_TRIPS)
+        ]
+        best = min((trip for trip in trips if trip is not None), default=None)
+        if best is None or best > _SLOWEST + 1e-6 * self._terms.period_us:
             raise refusals.slow(self._link.name, best)
+        if None in trips:
+            self._introduce()  # waiting may have cost the session
 
-    def _round_trip(self) -> float:
-        began_ns = self._clock.now_ns()
-        self._get(Parameter.TICK)
-        return 1e-9 * (self._clock.now_ns() - began_ns)
+    def _check_alone(self) -> None:
+        """Look for a second device of the same node; longer where the ticks are odd."""
+        ticks = self._caller.ticks
+        if ticks.suspicious:
+            self._caller.listen(max(_TWINS_S, _LATE * 1e-6 * self._terms.period_us))
+        if ticks.two_devices:
+            raise refusals.two_devices(self._link.name, self._terms.node)
 
-    def _clear(self) -> None:
-        """Leave a fault of an earlier run: whoever starts a run arms the device."""
-        self._join_ticks()
-        sample = self._caller.sample
-        if sample is None or sample.state != State.FAULT:
-            return
-        self._answer(clear=False)
-        if not self._answer_until(State.IDLE, clear=True):
-            raise refusals.faulty(self._link.name, name_of(self._caller.fault or sample.fault_class))
+    def _check_cold(self) -> None:
+        """Refuse a device that puts out a voltage before it is armed."""
+        for _ in range(_HOT_SAMPLES):
+            sample = self._caller.hear_sample(PATIENCE)
+            if sample is None or sample.state == State.RUN or sample.voltage_mV == 0:
+                return
+        said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed" if sample else ""
+        raise refusals.impossible(self._link.name, said)
+
+    def _clearing(self) -> Clearing:
+        return Clearing(self._link.name, self._caller, self._clock, self._session, self._terms.watchdog_ms)
 
     def _set_limits(self) -> None:
         terms = self._terms
@@ -188,35 +208,34 @@ class Handshake:
                 raise refusals.not_taken(self._link.name, parameter.name, value, found)
 
     def _arm(self) -> None:
-        self._join_ticks()
-        if not self._answer_until(State.RUN, arm=True):
-            sample = self._caller.sample
-            state = State(sample.state).name if sample and sample.state in set(State) else "no state"
-            raise refusals.not_armed(self._link.name, state, PATIENCE)
-
-    def _answer_until(self, state: State, *, arm: bool = False, clear: bool = False) -> bool:
-        """Answer SAMPLEs at 0 V until one says `state`; False if none did in time."""
+        """Answer SAMPLEs at 0 V until one says RUN."""
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
         while self._clock.now_ns() < deadline_ns:
-            if self._answer(arm=arm, clear=clear) == state:
-                return True
-        return False
+            sample = self._caller.hear_sample(PATIENCE)
+            if sample is not None:
+                self._say(arm=True)
+                if sample.state == State.RUN:
+                    return
+        self._check_alone()
+        sample = self._caller.sample
+        state = (
+            State(sample.state).name if sample and sample.state in set(State) else "no state that there is"
+        )
+        raise refusals.not_armed(self._link.name, state, PATIENCE)
 
-    def _answer(self, *, arm: bool = False, clear: bool = False) -> int | None:
-        """Answer the next SAMPLE at 0 V; return its state."""
-        sample = self._caller.hear_sample(PATIENCE)
-        if sample is None:
-            return None
-        self._say(arm=arm, clear=clear)
-        return sample.state
-
-    def _say(self, *, arm: bool = False, clear: bool = False, release: bool = False) -> None:
+    def _say(self, *, arm: bool = False, release: bool = False) -> None:
         seq = self._caller.tick & 0x1FFF
-        self._caller.say(Drive(0, seq, arm, clear, release, self._session, self._terms.watchdog_ms))
+        self._caller.say(Drive(0, seq, arm, False, release, self._session, self._terms.watchdog_ms))
 
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
-        self._get(Parameter.TICK)
+        for _ in range(_JOINS):
+            told = self._get(Parameter.TICK)
+            if self._caller.hear_sample(PATIENCE) is None:
+                continue
+            if _EARLY <= self._caller.tick - told <= _LATE:
+                return
+        raise refusals.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
 
     def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
         return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)
@@ -225,4 +244,10 @@ class Handshake:
         found = self._ask(ParameterGet(parameter))
         if found is None or found.result != Result.OK:
             raise refusals.not_told(self._link.name, parameter.name)
+        if not is_possible(parameter, found.value):
+            raise refusals.impossible(self._link.name, f"{parameter.name} = {found.value}")
         return found.value
+
+
+def _is_tick(answer: ParameterValue) -> bool:
+    return answer.id == Parameter.TICK

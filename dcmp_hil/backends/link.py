@@ -23,6 +23,11 @@ class Link(Protocol):
         ...
 
     @property
+    def other_carrier(self) -> str:
+        """Settings that fit what was heard better than this link's own; empty where nothing says so."""
+        ...
+
+    @property
     def pending(self) -> bool:
         """Whether more may be there than what `receive` returned last; never False where there is."""
         ...

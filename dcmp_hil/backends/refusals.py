@@ -4,37 +4,45 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dcmp_hil.backends.caller import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
 from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from dcmp_hil.wire.messages import ParameterValue
 
+_TIMER_S = 0.035  # two waits of an adapter's 16 ms, at most
 _FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
 
 
-def only_damage(name: str) -> OpenError:
-    """Make the error for a line on which something is heard, and no frame in it."""
+def only_damage(name: str, other_carrier: str) -> OpenError:
+    """Make the error for a line on which something is heard, and no frame in it; the carrier may be told."""
+    if other_carrier:
+        return OpenError(f"{name}: a device answers there on another carrier. Say {other_carrier}.")
     return OpenError(
-        f"{name}: something arrives, but no valid frame. Check the baud or bit rate (backend.baud, "
-        "backend.bitrate) and that the device is set to the same carrier."
+        f"{name}: something arrives, but no valid frame: all of it is damaged. Check the baud or bit rate "
+        "(backend.baud, backend.bitrate), cable and ground, and that the device is set to the same carrier."
     )
 
 
-def other_node(name: str, node: int) -> OpenError:
+def other_node(name: str, node: int, nodes: Collection[int]) -> OpenError:
     """Make the error for frames of other devices alone."""
+    there = " and ".join(str(number) for number in sorted(nodes))
     return OpenError(
-        f"{name}: frames arrive, but none from node {node}. Check backend.node; `dcmp-hil ports` lists "
-        "who is there."
+        f"{name}: frames arrive from node {there}, but none from node {node}. Check backend.node; `dcmp-hil "
+        "ports` lists who is there."
     )
 
 
 def silence(name: str, seconds: float) -> OpenError:
     """Make the error for a silent line."""
     return OpenError(
-        f"{name}: nothing arrives within {1e3 * seconds:.0f} ms. Check that the device has power, that "
-        "the cable is the right one, and the rate; `dcmp-hil ports` lists what answers where."
+        f"{name}: nothing arrives within {seconds:g} s. Check that the device has power, that the cable is "
+        "the right one, and the rate; `dcmp-hil ports` lists what answers where. A board that boots when "
+        "its port is opened may need a longer backend.boot_wait_s."
     )
 
 
@@ -61,13 +69,18 @@ def owned(name: str) -> OpenError:
     )
 
 
-def slow(name: str, seconds: float) -> OpenError:
-    """Make the error for answers that take too long."""
-    return OpenError(
-        f"{name}: an answer takes {1e3 * seconds:.1f} ms, and commands older than 3 ms are refused. Lower "
-        "the USB adapter's latency timer: "
-        "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
-    )
+def slow(name: str, seconds: float | None) -> OpenError:
+    """Make the error for answers that take too long; None for longer than was waited."""
+    took = f"{1e3 * seconds:.1f} ms" if seconds is not None else f"more than {1e3 * LONGEST_TRIP:.0f} ms"
+    said = f"{name}: an answer takes {took}, there and back, and commands older than 3 ms are refused."
+    if seconds is None or seconds > _TIMER_S:
+        return OpenError(
+            f"{said} No setting of an adapter makes so much: the line goes through something slow, such as a "
+            "network, a radio or another program. Plug the device into this computer."
+        )
+    port = name.rpartition("/")[2]
+    timer = f"/sys/bus/usb-serial/devices/{port if port.startswith('ttyUSB') else 'ttyUSB0'}/latency_timer"
+    return OpenError(f"{said} Lower the USB adapter's latency timer: echo 1 > {timer}")
 
 
 def faulty(name: str, fault: str) -> OpenError:
@@ -75,6 +88,38 @@ def faulty(name: str, fault: str) -> OpenError:
     return OpenError(
         f"{name}: the device stays in fault {fault}. Look at what `dcmp-hil monitor` says, mend the "
         "cause, and switch the device off and on."
+    )
+
+
+def other_fault(name: str, first: str, second: str) -> OpenError:
+    """Make the error for a fault that takes the place of the one that is being cleared."""
+    return OpenError(
+        f"{name}: the device was in fault {first}, and while that was cleared it fell into {second}. Look at "
+        "what `dcmp-hil monitor` says, mend the cause, then start again."
+    )
+
+
+def impossible(name: str, what: str) -> OpenError:
+    """Make the error for an answer that no device can mean."""
+    return OpenError(
+        f"{name}: the device says {what}, which cannot be. It is not used. {_FIRMWARE}, or mend the device's "
+        "own; `dcmp-hil monitor` shows what it sends."
+    )
+
+
+def two_devices(name: str, node: int) -> OpenError:
+    """Make the error for a node that is there twice."""
+    return OpenError(
+        f"{name}: two devices send as node {node}: their ticks jump forth and back. Unplug one, or build its "
+        "firmware with another node (backend.node then says which of them to run)."
+    )
+
+
+def no_samples(name: str, seconds: float, heard: str) -> OpenError:
+    """Make the error for a device that sends all but samples."""
+    return OpenError(
+        f"{name}: {heard} arrives, but no SAMPLE within {seconds:g} s. The line is right; the device's "
+        f"periodic tick does not run, or its samples find no room. {_FIRMWARE}."
     )
 
 

@@ -16,7 +16,8 @@ from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.failures import cannot_open, reason
 from dcmp_hil.config.backends import Serial as SerialSettings
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
-from dcmp_hil.wire import cobs
+from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.carriers import has_samples
 
 if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
@@ -27,6 +28,7 @@ FAILURES = (serial.SerialException, OSError, termios.error, ValueError, TypeErro
 """What pyserial raises when a port fails: four unrelated types, TypeError if it was closed meanwhile."""
 
 _CHUNK = 4096
+_KEPT = 16_384  # bytes, among which another carrier shows
 _DELIMITER = b"\0"
 
 
@@ -64,11 +66,20 @@ class SerialLink:
         self._receiver = cobs.Receiver()
         self._frames: deque[Frame] = deque()
         self._more = True
+        self._first = b""  # what was read before the first frame
+        self._unknown = True  # whether that carrier is spoken there
 
     @property
     def corrupt(self) -> int:
         """What arrived so far and was no frame."""
         return self._receiver.corrupt
+
+    @property
+    def other_carrier(self) -> str:
+        """Settings for slcan, if that is what was heard."""
+        if not has_samples(self._first, slcan.Receiver()):
+            return ""
+        return f"--set backend.kind=can --set backend.interface=slcan --set backend.channel={self.name}"
 
     @property
     def pending(self) -> bool:
@@ -134,7 +145,14 @@ class SerialLink:
             raise self._broken(error) from error
         self._more = len(data) == _CHUNK
         frames.extend(self._receiver.feed(data))
+        if self._unknown:
+            self._keep_first(data)
         return frames.popleft() if frames else None
+
+    def _keep_first(self, data: bytes) -> None:
+        """Keep what is heard until the first frame shows that the carrier is right."""
+        self._first += data
+        self._unknown = not self._frames and len(self._first) < _KEPT
 
     def _write(self, data: bytes) -> None:
         port = self._opened()

@@ -14,7 +14,8 @@ import can
 
 from dcmp_hil.backends.serial_link import FAILURES, open_port, write_now
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.wire import slcan
+from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.carriers import has_samples
 
 if TYPE_CHECKING:
     import serial
@@ -76,6 +77,11 @@ class SlcanBus(can.BusABC):
     def corrupt(self) -> int:
         """Lines so far that were no frame."""
         return self._receiver.corrupt
+
+    @property
+    def is_cobs(self) -> bool:
+        """Whether what was heard first are COBS frames of a device of ours."""
+        return has_samples(self._first, cobs.Receiver())
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - never waits
         """Send a frame; what the port has no room for is dropped."""

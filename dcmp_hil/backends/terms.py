@@ -39,6 +39,8 @@ class Terms:
         1000, signed by the amplifier's wiring.
     zero
         Count at which the arm hangs; None for where it is at the start.
+    velocity_limit, position_limit
+        rad/s and rad either way, at which the host ends a run; None where it watches neither.
     boot_wait
         s, for the first sample.
     warn_share, warn_clock_share
@@ -54,6 +56,8 @@ class Terms:
     rad_per_count: float
     mV_per_V: float
     zero: int | None
+    velocity_limit: float | None
+    position_limit: float | None
     boot_wait: float
     warn_share: float
     warn_clock_share: float
@@ -72,7 +76,8 @@ class Terms:
             raise ConfigError(
                 f'backend.kind: got "{device.kind}"; expected a device on a wire, such as "serial".'
             )
-        slew = rig.amplifier.slew
+        slew, limits = rig.amplifier.slew, rig.supervisor
+        watched = limits.monitors == "all"
         return cls(
             node=device.node,
             counts_per_rev=round(counts),
@@ -83,6 +88,8 @@ class Terms:
             rad_per_count=rig.encoder.sign * math.tau / counts,
             mV_per_V=1e3 * rig.amplifier.sign,
             zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
+            velocity_limit=limits.velocity_limit_rad_s if watched else None,
+            position_limit=limits.position_limit_rad if watched else None,
             boot_wait=device.boot_wait_s,
             warn_share=1e-2 * device.warn_percent,
             warn_clock_share=1e-2 * device.warn_clock_percent,

@@ -10,6 +10,7 @@ from rich.text import Text
 from dcmp_hil.backends.caller import Caller
 from dcmp_hil.backends.discovery import state_in_words
 from dcmp_hil.backends.links import make_link
+from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.cli import console
 from dcmp_hil.cli.streams import output_failed
 from dcmp_hil.clock import MonotonicClock
@@ -41,11 +42,29 @@ class _Brief:
         return True
 
 
+class _Ticks:
+    """Warns once of a node that is there twice."""
+
+    def __init__(self) -> None:
+        self._watches: dict[int, TickWatch] = {}
+        self._told: set[int] = set()
+
+    def take(self, node: int, message: Message) -> None:
+        """Take a message of a node."""
+        if not isinstance(message, SampleReport) or node in self._told:
+            return
+        watch = self._watches.setdefault(node, TickWatch())
+        watch.add(message)
+        if watch.two_devices:
+            self._told.add(node)
+            console.warn(f"two devices send as node {node}: their ticks jump forth and back. Unplug one.")
+
+
 def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
     """Print messages for `duration` (s, 0 for ever) or until somebody ends it; return the exit code."""
     clock = MonotonicClock()
     link = make_link(rig.backend, clock)
-    caller, brief = Caller(link, clock, 0), _Brief()
+    caller, brief, ticks = Caller(link, clock, 0), _Brief(), _Ticks()
     heard = 0
     try:
         link.open()
@@ -58,12 +77,16 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
                 if found is None:
                     continue
                 heard += 1
+                ticks.take(*found)
                 if all_frames or brief.lets_through(*found, now_ns):
                     _show(1e-9 * (now_ns - began_ns), *found)
+        hint = "" if heard else link.other_carrier
     finally:
         link.close()
     damaged = link.corrupt + caller.corrupt
     console.note(f"{heard} messages, {damaged} damaged frames")
+    if hint:
+        console.warn(f"{link.name}: a device speaks there on another carrier. Say {hint}.")
     return stop.exit_code
 
 

@@ -21,6 +21,10 @@ def ports(
     bitrate: Annotated[
         int, typer.Option(metavar="BIT_S", min=10_000, max=1_000_000, help="Of CAN buses.")
     ] = 1_000_000,
+    wait: Annotated[
+        float,
+        typer.Option(metavar="S", min=0.1, max=60, help="For the first sample: some boards boot first."),
+    ] = 0.25,
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
@@ -34,7 +38,7 @@ def ports(
     from dcmp_hil.clock import MonotonicClock
 
     found = 0
-    for finding in find_devices(port or (), baud, bitrate, MonotonicClock()):
+    for finding in find_devices(port or (), baud, bitrate, MonotonicClock(), wait):
         found += 1
         console.out.print(Text.assemble((finding.place, "bold"), f"  {finding.description}"))
         console.out.print(Text(f"    {finding.device}", "green" if finding.settings else "dim"))

@@ -89,6 +89,8 @@ class BoardLink:
         """What arrived so far and was no frame."""
         return self._receiver.corrupt if self._receiver else 0
 
+    other_carrier = ""  # the board has the carrier that the rig says
+
     @property
     def pending(self) -> bool:
         """Whether the board sent more in its last period than was looked at."""

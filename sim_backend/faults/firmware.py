@@ -12,12 +12,14 @@ from sim_backend.faults.base import FaultModel, Kind, Number
 from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
     from sim_backend.board.board import Board
+    from sim_backend.board.plant_io import PlantIO
     from sim_backend.faults.wire import Way
+    from sim_backend.pacer import Pacer
 
 _CARRIERS: dict[str, Any] = {"cobs": cobs, "slcan": slcan}
 _SEQ, _WORD = 0x1FFF, 2.0**32 - 1
@@ -38,16 +40,20 @@ class Reset(FaultModel):
 class WrongClock(FaultModel):
     """The device's clock is off: what it calls a period is shorter or longer."""
 
-    stretch: Callable[[float], None] = staticmethod(lambda _: None)
-    """Of pace and plant; put in by the injector."""
+    of: tuple[Pacer, PlantIO]
+    """The board's clock and what it moves; put in by the injector."""
 
     def begin(self) -> None:
         """Go at the wrong rate."""
-        self.stretch(1.0 / self._rate)
+        self._stretch(1.0 / self._rate)
 
     def end(self) -> None:
         """Go right again."""
-        self.stretch(self._rate)
+        self._stretch(self._rate)
+
+    def _stretch(self, factor: float) -> None:
+        for what in self.of:
+            what.stretch(factor)
 
     @property
     def _rate(self) -> float:

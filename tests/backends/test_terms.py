@@ -27,7 +27,9 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
             "amplifier.slew_V_s=250",
         )
     )
-    assert terms == Terms(3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, -7)
+    assert terms == Terms(
+        3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, -7, 20.0, 6.2832, 3.0, 0.005, 0.005
+    )
 
 
 def test_terms_of_a_rig_without_a_wire_are_refused() -> None:

@@ -1,0 +1,120 @@
+"""What a device says of itself, held against what can be, and against the rig."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dcmp_hil.wire.messages import Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dcmp_hil.backends.terms import Terms
+
+_INT = 2**31 - 1
+RANGES = {
+    Parameter.BOARD: (0, _INT),
+    Parameter.BOOT_COUNT: (0, _INT),
+    Parameter.RESET_CAUSE: (0, _INT),
+    Parameter.TICK: (0, _INT),
+    Parameter.COUNTS_PER_REV: (1, 2**24),
+    Parameter.PERIOD_US: (50, 100_000),
+    Parameter.VOLTAGE_LIMIT_MV: (1, 32_767),
+    Parameter.SLEW_MV_PER_MS: (0, _INT),
+    Parameter.WATCHDOG_MS: (5, 50),
+    Parameter.SPEED_LIMIT_COUNTS_S: (1, _INT),
+    Parameter.TRAVEL_LIMIT_COUNTS: (1, _INT),
+    Parameter.EDGE_STAMPS: (0, 1),
+    Parameter.LAST_FAULT: (0, 255),
+    Parameter.LAST_FAULT_DETAIL: (-_INT - 1, _INT),
+}
+"""What a value can be at all, both ends included."""
+COMPARED = (
+    Parameter.COUNTS_PER_REV,
+    Parameter.PERIOD_US,
+    Parameter.VOLTAGE_LIMIT_MV,
+    Parameter.SLEW_MV_PER_MS,
+    Parameter.SPEED_LIMIT_COUNTS_S,
+    Parameter.TRAVEL_LIMIT_COUNTS,
+)
+
+
+def is_possible(parameter: Parameter, value: int) -> bool:
+    """Whether a parameter can have that value on any device."""
+    lowest, highest = RANGES[parameter]
+    return lowest <= value <= highest
+
+
+def differences(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+    """Say where the device does not fit the rig, each with its remedy.
+
+    Parameters
+    ----------
+    terms
+        What the rig says.
+    device
+        The values of COMPARED, all of them possible.
+    """
+    return [sentence for sentence in (*_same(terms, device), *_limits(terms, device)) if sentence]
+
+
+def remarks(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+    """Say what of the device the rig does not know, and can run without."""
+    slew = device[Parameter.SLEW_MV_PER_MS]
+    sentence = (
+        f"amplifier.slew_V_s: the rig says none, the device changes its voltage by {slew:g} V/s at most. Put "
+        "that into the rig, and the loop reckons with it."
+    )
+    return [sentence] if slew and terms.slew_mV_per_ms is None else []
+
+
+def _same(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+    counts = device[Parameter.COUNTS_PER_REV]
+    rate_hz, asked_hz = 1e6 / device[Parameter.PERIOD_US], 1e6 / terms.period_us
+    return [
+        (
+            f"encoder.counts_per_rev: the rig says {terms.counts_per_rev}, the device {counts}. "
+            "Correct the rig, or build the firmware for this encoder."
+        )
+        * (counts != terms.counts_per_rev),
+        (
+            f"loop.rate_hz: the rig says {asked_hz:g}, the device {rate_hz:g}. "
+            "Correct the rig, or build the firmware for this rate."
+        )
+        * (rate_hz != asked_hz),
+    ]
+
+
+def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+    rad = math.tau / device[Parameter.COUNTS_PER_REV]
+    limits: list[tuple[str, float | None, float]] = [
+        (
+            "amplifier.voltage_limit_V",
+            1e-3 * terms.voltage_limit_mV,
+            1e-3 * device[Parameter.VOLTAGE_LIMIT_MV],
+        ),
+        (
+            "supervisor.velocity_limit_rad_s",
+            terms.velocity_limit,
+            _rounded_down(rad * device[Parameter.SPEED_LIMIT_COUNTS_S]),
+        ),
+        (
+            "supervisor.position_limit_rad",
+            terms.position_limit,
+            _rounded_down(rad * device[Parameter.TRAVEL_LIMIT_COUNTS]),
+        ),
+    ]
+    slew = device[Parameter.SLEW_MV_PER_MS]
+    if slew:
+        limits.append(("amplifier.slew_V_s", terms.slew_mV_per_ms, slew))
+    return [
+        f"{key}: the rig says {asked:g}, the device allows {allowed:g}. Lower it in the rig."
+        for key, asked, allowed in limits
+        if asked is not None and _rounded_down(asked) > allowed
+    ]
+
+
+def _rounded_down(value: float) -> float:
+    """Return a limit that can be written as it is printed."""
+    return math.floor(1e3 * value + 1e-6) / 1e3

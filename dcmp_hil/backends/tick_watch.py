@@ -1,0 +1,43 @@
+"""Whether the SAMPLEs of one node come from one device."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+from dcmp_hil.wire.counters import nearest
+
+if TYPE_CHECKING:
+    from dcmp_hil.wire.messages import SampleReport
+
+_KEPT = 32
+_FEWEST = 24
+_SHARE = 0.25  # of the kept: one reset, frames that come twice or late make fewer
+
+
+class TickWatch:
+    """Sees the ticks of two devices in one stream.
+
+    They jump forth and back; or one tick comes twice, with different contents.
+    """
+
+    def __init__(self) -> None:
+        self._last: SampleReport | None = None
+        self._odd: deque[bool] = deque(maxlen=_KEPT)
+
+    def add(self, sample: SampleReport) -> None:
+        """Take the next SAMPLE of the node."""
+        last, self._last = self._last, sample
+        if last is not None:
+            step = nearest(0, sample.tick - last.tick, 8)
+            self._odd.append(step < 0 or (step == 0 and sample != last))
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether a longer look is worth it."""
+        return any(self._odd)
+
+    @property
+    def two_devices(self) -> bool:
+        """Whether two devices send under this node."""
+        return len(self._odd) >= _FEWEST and sum(self._odd) >= _SHARE * len(self._odd)
