@@ -207,6 +207,7 @@ class _Wire:
     name = "wire"
     pending = False
     corrupt = 0
+    other_carrier = ""
 
     def __init__(self, board: Board) -> None:
         self._board, self._receiver = board, cobs.Receiver()

@@ -37,7 +37,7 @@ LONGEST_TRIP = 0.4  # s, for the answer to a question that is asked once
 class _Owed(NamedTuple):
     """Answers that are still to come to a question that was asked more than once."""
 
-    count: int
+    answers: int
     until_ns: int
 
 
@@ -144,14 +144,14 @@ class Caller:
 
     def _ask_once(self, question: Message, key: object) -> None:
         owed = self._owed.get(key, _Owed(0, 0))
-        self._owed[key] = owed._replace(count=owed.count + 1)
+        self._owed[key] = owed._replace(answers=owed.answers + 1)
         self.say(question)
 
     def _await_owed(self, key: object) -> None:
         """Hear late answers to earlier questions of the same kind."""
         while (owed := self._owed.get(key)) is not None:
             left_ns = owed.until_ns - self._clock.now_ns()
-            if owed.count <= 0 or left_ns <= 0:
+            if owed.answers <= 0 or left_ns <= 0:
                 break
             self.hear(1e-9 * left_ns)
         self._owed.pop(key, None)
@@ -159,9 +159,9 @@ class Caller:
     def _let_owed_come(self, key: object) -> None:
         """Answers follow one another as their questions did, 50 ms apart."""
         owed = self._owed.pop(key, None)
-        if owed is not None and owed.count > 0:
-            until_ns = self._clock.now_ns() + int(1e9 * REPEAT * (owed.count + 1))
-            self._owed[key] = _Owed(owed.count, until_ns)
+        if owed is not None and owed.answers > 0:
+            until_ns = self._clock.now_ns() + int(1e9 * REPEAT * (owed.answers + 1))
+            self._owed[key] = _Owed(owed.answers, until_ns)
 
     def _listen_until(self, deadline_ns: int) -> None:
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
@@ -199,7 +199,7 @@ class Caller:
     def _note_answer(self, *key: object) -> None:
         owed = self._owed.get(key)
         if owed is not None:
-            self._owed[key] = owed._replace(count=owed.count - 1)
+            self._owed[key] = owed._replace(answers=owed.answers - 1)
 
     def _note_foreign(self, frame: Frame) -> None:
         number, _ = frame

@@ -38,6 +38,7 @@ _SLOWEST = 3e-3  # s: a command older than that is refused by the device
 _JOINS, _EARLY, _LATE = 3, -4, 32  # ticks that a SAMPLE may differ from what TICK said before it
 _HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
 _TWINS_S = 0.1
+_RELEASES, _NEXT_S = 3, 0.1
 
 
 class Greeting(NamedTuple):
@@ -111,7 +112,9 @@ class Handshake:
         """Release the session, so that whoever tries next need not wait until it lapses."""
         with contextlib.suppress(BackendError):
             self._get(Parameter.TICK)
-            self._say(release=True)
+            for _ in range(_RELEASES):
+                self._caller.hear_sample(_NEXT_S)  # a command must answer a newer one than the last did
+                self._say(release=True)
 
     def _listen(self) -> None:
         caller, wait = self._caller, self._terms.boot_wait
@@ -184,11 +187,12 @@ class Handshake:
 
     def _check_cold(self) -> None:
         """Refuse a device that puts out a voltage before it is armed."""
+        said = ""
         for _ in range(_HOT_SAMPLES):
             sample = self._caller.hear_sample(PATIENCE)
             if sample is None or sample.state == State.RUN or sample.voltage_mV == 0:
                 return
-        said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed" if sample else ""
+            said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed"
         raise refusals.impossible(self._link.name, said)
 
     def _clearing(self) -> Clearing:
@@ -218,9 +222,7 @@ class Handshake:
                     return
         self._check_alone()
         sample = self._caller.sample
-        state = (
-            State(sample.state).name if sample and sample.state in set(State) else "no state that there is"
-        )
+        state = State(sample.state).name if sample and sample.state in set(State) else "an unknown state"
         raise refusals.not_armed(self._link.name, state, PATIENCE)
 
     def _say(self, *, arm: bool = False, release: bool = False) -> None:
@@ -229,6 +231,7 @@ class Handshake:
 
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
+        told = 0
         for _ in range(_JOINS):
             told = self._get(Parameter.TICK)
             if self._caller.hear_sample(PATIENCE) is None:

@@ -156,7 +156,7 @@ class Injector:
             effect.elapse = lambda seconds: link.elapse(round(seconds / self._facts.period))
         for clock in (timer.effect for timer in self.timers):
             if isinstance(clock, WrongClock):
-                clock.of = pace, board.pins
+                clock.of = pacer, board.pins
         self.listener.attached(board)
         self._look()
         return link
