@@ -31,6 +31,7 @@ MOST_WAITING = 512  # frames that are skipped for a newer one; a peer that flood
 REPEAT = 0.05  # s, after which a question is asked again
 PATIENCE = 0.5  # s, for an answer in all
 _UNDER_WAY = 0.5  # s: a slow line may bring the first answer only now
+_LONG_UNDER_WAY = 1.0  # s: no answer comes later than that
 LONGEST_TRIP = 0.4  # s, for the answer to a question that is asked once
 
 
@@ -127,7 +128,7 @@ class Caller:
                 break
         else:
             found = self._until(_UNDER_WAY, answer, fits)
-        self._let_owed_come(key)
+        self._let_owed_come(key, answered=found is not None)
         return found
 
     def time_answer(
@@ -139,7 +140,7 @@ class Caller:
         began_ns = self._clock.now_ns()
         self._ask_once(question, key)
         found = self._until(LONGEST_TRIP, answer, fits)
-        self._let_owed_come(key)
+        self._let_owed_come(key, answered=found is not None)
         return None if found is None else 1e-9 * (self._clock.now_ns() - began_ns)
 
     def _ask_once(self, question: Message, key: object) -> None:
@@ -156,11 +157,12 @@ class Caller:
             self.hear(1e-9 * left_ns)
         self._owed.pop(key, None)
 
-    def _let_owed_come(self, key: object) -> None:
-        """Answers follow one another as their questions did, 50 ms apart."""
+    def _let_owed_come(self, key: object, *, answered: bool) -> None:
+        """Answers follow one another as their questions did, 50 ms apart; the first may be long under way."""
         owed = self._owed.pop(key, None)
         if owed is not None and owed.answers > 0:
-            until_ns = self._clock.now_ns() + int(1e9 * REPEAT * (owed.answers + 1))
+            longest = REPEAT * (owed.answers + 1) if answered else _LONG_UNDER_WAY
+            until_ns = self._clock.now_ns() + int(1e9 * longest)
             self._owed[key] = _Owed(owed.answers, until_ns)
 
     def _listen_until(self, deadline_ns: int) -> None:

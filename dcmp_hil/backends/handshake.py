@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import secrets
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -167,15 +168,16 @@ class Handshake:
 
     def _check_round_trip(self) -> None:
         """Refuse a line on which every command would be too old: a USB adapter may collect bytes."""
-        trips = [
-            self._caller.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
-            for _ in range(_ROUND_TRIPS)
-        ]
-        best = min((trip for trip in trips if trip is not None), default=None)
-        if best is None or best > _SLOWEST + 1e-6 * self._terms.period_us:
+        best, waited = math.inf, False
+        for _ in range(_ROUND_TRIPS):
+            trip = self._caller.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
+            best, waited = min(best, trip or math.inf), waited or trip is None
+            if best <= _SLOWEST + 1e-6 * self._terms.period_us:
+                break
+        else:
             raise refusals.slow(self._link.name, best)
-        if None in trips:
-            self._introduce()  # waiting may have cost the session
+        if waited:
+            self._introduce()  # that may have cost the session
 
     def _check_alone(self) -> None:
         """Look for a second device of the same node; longer where the ticks are odd."""

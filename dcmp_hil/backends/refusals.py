@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.backends.caller import LONGEST_TRIP
@@ -69,11 +70,11 @@ def owned(name: str) -> OpenError:
     )
 
 
-def slow(name: str, seconds: float | None) -> OpenError:
-    """Make the error for answers that take too long; None for longer than was waited."""
-    took = f"{1e3 * seconds:.1f} ms" if seconds is not None else f"more than {1e3 * LONGEST_TRIP:.0f} ms"
+def slow(name: str, seconds: float) -> OpenError:
+    """Make the error for answers that take too long; infinity for longer than was waited."""
+    took = f"{1e3 * seconds:.1f} ms" if seconds < math.inf else f"more than {1e3 * LONGEST_TRIP:.0f} ms"
     said = f"{name}: an answer takes {took}, there and back, and commands older than 3 ms are refused."
-    if seconds is None or seconds > _TIMER_S:
+    if seconds > _TIMER_S:
         return OpenError(
             f"{said} No setting of an adapter makes so much: the line goes through something slow, such as a "
             "network, a radio or another program. Plug the device into this computer."
