@@ -22,6 +22,7 @@ from dcmp_hil.telemetry.blueprint import dashboard
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.picture import draw_run
 from dcmp_hil.telemetry.signals import SIGNALS, by_plot
+from dcmp_hil.telemetry.titles import title
 from sim_backend.faults.fault import KINDS as FAULTS
 from sim_backend.plant import make_plant
 from tests.contract.benches import ALL, on_bench
@@ -134,6 +135,10 @@ def views(part: Any) -> Iterator[Any]:
             yield from views(inner)
     else:
         yield part
+
+
+def test_every_plot_is_named_with_its_unit() -> None:
+    assert [plot for plot in (*by_plot(), "motor/current_A") if not title(plot).endswith("]")] == []
 
 
 @pytest.mark.parametrize("more", [(), MORE])

@@ -7,6 +7,7 @@ _UNITS = {
     "_rad": "rad",
     "_N_m": "N·m",
     "_V": "V",
+    "_A": "A",
     "_us": "µs",
 }  # the longer ending before the shorter
 

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from dcmp_hil import run
-from dcmp_hil.errors import ConfigError
+from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.live.mailbox import APPLIED
+from dcmp_hil.live.settable import changed
 from dcmp_hil.session import Session
 from sim_backend.faults.base import Number
 from sim_backend.faults.fault import KINDS, Fault
@@ -21,6 +23,7 @@ from sim_backend.faults.plan import FaultPlan, inject
 from tests.faults.matrix import judge, outcome_of
 from tests.faults.rows import SILENT, Row
 from tests.helpers import bench
+from tests.live.here import Here
 
 if TYPE_CHECKING:
     from dcmp_hil.session import Result
@@ -126,6 +129,19 @@ def test_a_run_takes_texts_and_objects_together() -> None:
     assert lost_at(faulty) == [100, 101]
     pushed, usual = (result.columns["position_true_rad"] for result in (faulty, quick()))
     assert pushed[60] != usual[60]
+
+
+@pytest.mark.parametrize("backend", ["backend.kind=sim", BOARD])
+def test_a_run_with_faults_of_the_host_can_be_changed_while_it_goes_on(backend: str) -> None:
+    rig, control = bench(backend, QUICK), Here()
+    faults = ["host.slow:ms=0.1,at=0.1s", "host.spoil:where=demand,at=0.4s"]
+    session = Session(rig, duration=0.5, fast=True, control=control, faults=faults)
+    number = control.mailbox.put(changed(rig, ["controller.kp_1_s2=4100", "observer.M_rad_s3=20"])[1])
+    with pytest.raises(TripError, match="asked for nan"):
+        session.run()
+    answer = control.mailbox.answer(number)
+    assert answer is not None
+    assert answer.what == APPLIED
 
 
 def test_a_rig_is_the_same_object_whatever_goes_wrong() -> None:
