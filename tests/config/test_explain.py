@@ -1,11 +1,13 @@
 """What a rig comes to, and what in it is questionable."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from dcmp_hil.config import load_rig, shipped_rigs
 from dcmp_hil.config.explain import explain, warnings
+from tests.installed import Finished
 
 
 def test_explain_lists_every_key_with_value_and_meaning() -> None:
@@ -77,3 +79,17 @@ def test_warnings_name_limit_when_csv_reference_leaves_it(tmp_path: Path) -> Non
     (sentence,) = warnings(load_rig("bench-1khz", overrides))
     assert "will be held" in sentence
     assert warnings(load_rig("bench-1khz", [*overrides, "supervisor.position_limit_rad=8"])) == []
+
+
+@pytest.mark.parametrize("kind", ["serial", "my_lab:Motor"])
+def test_check_warns_of_a_start_without_a_probe_wherever_a_motor_may_move(
+    script: Callable[..., Finished], tmp_path: Path, kind: str
+) -> None:
+    (tmp_path / "my_lab.py").write_text("class Motor:\n    pass\n")
+    port = ["--set", "backend.port=/dev/ttyACM0"] if kind == "serial" else []
+    done = script(
+        "check", "bench-1khz", "--set", f"backend.kind={kind}", *port, "--set", "supervisor.probe=off"
+    )
+    assert done.code == 0, done.err
+    assert "probe" in done.err
+    assert "is found by running away" in " ".join(done.err.split())
