@@ -1,4 +1,4 @@
-"""The simulated rig as a backend: virtual time, paced by whatever clock it is given."""
+"""The simulated rig as a backend: virtual time, paced by the clock it is given."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class SimBackend:
         return voltage, tick
 
     def write(self, voltage: float) -> None:
-        """Hand a voltage to the amplifier, V."""
+        """Give a voltage to the amplifier, V."""
         self._amplifier.command(voltage)
 
     def truth(self) -> Truth:
@@ -107,5 +107,5 @@ class SimBackend:
 
     @property
     def live(self) -> bool:
-        """Whether the amplifier is on; off, it puts out 0 V whatever it is told."""
+        """Whether the amplifier is on; off, it puts out 0 V in any case."""
         return self._amplifier.live

@@ -1,4 +1,4 @@
-"""The pace of a simulation: tick n is at its own instant of whatever clock there is."""
+"""The pace of a simulation: tick n has its own instant of the clock."""
 
 from __future__ import annotations
 

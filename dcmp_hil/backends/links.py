@@ -1,4 +1,4 @@
-"""Links by themselves, for whoever only listens: from the same settings as a run's."""
+"""Links that only listen, from the same settings as a run's."""
 
 from __future__ import annotations
 

@@ -102,10 +102,10 @@ class BoardLink:
         self._ticks = 0
 
     def close(self) -> None:
-        """Do nothing: the board stops with whoever made it tick."""
+        """Do nothing: a board ticks only while it is read."""
 
     def send(self, frame: Frame) -> None:
-        """Hand a frame to the board."""
+        """Give a frame to the board."""
         if self._encode is None:
             self._board.receive_frame(*frame)
         else:

@@ -76,7 +76,7 @@ class Board:
         self._c_tick(self._at, self.now_us, self.pins.count())
 
     def receive(self, data: bytes) -> None:
-        """Hand bytes to the device, between two ticks."""
+        """Give bytes to the device, between two ticks."""
         self._c_receive(self._at, data, len(data), self.now_us)
 
     def transmit(self) -> bytes:
@@ -84,7 +84,7 @@ class Board:
         return self._sent() if self._view[_LENGTH] else b""
 
     def receive_frame(self, number: int, data: bytes) -> None:
-        """Hand a frame to the device, between two ticks; whatever the carrier is."""
+        """Give a frame to the device, between two ticks, on any carrier."""
         self._lib.hostlib_receive_frame(self._at, number, data, len(data), self.now_us)
 
     def transmit_frames(self) -> list[tuple[int, bytes]]:

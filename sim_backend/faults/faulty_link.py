@@ -53,7 +53,7 @@ class FaultyLink(BoardLink):
         self._rest = b""
 
     def send(self, frame: Frame) -> None:
-        """Hand a frame, or what is left of it, to the board."""
+        """Give a frame, or what is left of it, to the board."""
         number, data = frame
         piece = number.to_bytes(2, "little") + data if self._encode is None else self._encode(frame)
         for arriving in self._faults.passed(piece, "up"):

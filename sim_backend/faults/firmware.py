@@ -1,4 +1,4 @@
-"""Faults of a device, and what strangers send to it."""
+"""Faults of a device, and what other hosts send to it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Reset(FaultModel):
     _done = False
 
     def tick(self, board: Board | None) -> None:
-        """Press the button."""
+        """Reset the board in the first period."""
         if board is not None and not self._done:
             board.reset()
         self._done = True
@@ -61,12 +61,12 @@ class WrongClock(FaultModel):
 
 
 class RogueHost(FaultModel):
-    """Says something to the device that its host has not said; `times` times, one a period."""
+    """Sends the device something that its host has not sent; `times` times, one a period."""
 
     _said = 0
 
     def tick(self, board: Board | None) -> None:
-        """Say it."""
+        """Send the message to the board."""
         if board is not None and self._said < self.number("times"):
             self._said += 1
             board.receive_frame(*pack(self.message(board), self.facts.node))
@@ -139,7 +139,7 @@ FIRMWARE = {
     "firmware.reset": Kind(Reset, "the device is reset", wired=True),
     "firmware.stop": Kind(
         RogueHost,
-        "somebody sends STOP",
+        "STOP is sent by another host",
         {"reason": Number("", 0, 255, 3), "times": _TIMES},
         wired=True,
     ),

@@ -16,7 +16,7 @@ _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class InjectedError(Exception):
-    """What `host.raise` raises, as a bug in somebody's controller would."""
+    """What `host.raise` raises, as a bug in a user's controller would."""
 
 
 class InjectedBaseError(BaseException):
@@ -27,7 +27,7 @@ class HostFault(FaultModel):
     """Between the stages of a period."""
 
     elapse: Callable[[float], None]
-    """Lets time pass, s, without the host noticing; whoever injects gives it."""
+    """Lets time pass, s, without the host noticing; the injector sets it."""
 
     def sample(self, sample: Sample) -> Sample:
         """Return what the loop reads."""
@@ -46,15 +46,15 @@ class Spoil(HostFault):
     """A number of the period is none."""
 
     def sample(self, sample: Sample) -> Sample:
-        """Spoil one of its numbers."""
+        """Return the sample with one number spoilt."""
         return sample._replace(**self._spoilt("sample"))
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Spoil x1, x2 or w."""
+        """Return the estimate with x1, x2 or w spoilt."""
         return estimate._replace(**self._spoilt("estimate"))
 
     def demand(self, demand: float) -> float:
-        """Spoil it."""
+        """Return the spoilt demand, V."""
         return self._value if self.word("where") == "demand" else demand
 
     @property
@@ -92,7 +92,7 @@ class Diverge(HostFault):
     _factor = 1.0
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Make it larger every period."""
+        """Return the estimate, further away every period."""
         self._factor *= self.number("factor")
         grown = self._factor - 1.0
         x1, x2, w = estimate
@@ -105,7 +105,7 @@ class Slow(HostFault):
     _left: int | None = None
 
     def demand(self, demand: float) -> float:
-        """Take it."""
+        """Return the demand, later."""
         left = round(self.number("times")) if self._left is None else self._left
         if left and self.rng.random() < self.number("p"):
             left -= 1
@@ -123,7 +123,7 @@ class Late(Slow):
         return sample
 
     def demand(self, demand: float) -> float:
-        """Leave it."""
+        """Return the demand in time."""
         return demand
 
 
@@ -146,7 +146,7 @@ HOST = {
     ),
     "host.raise": Kind(
         Raise,
-        "somebody's class raises",
+        "observer or controller raises",
         {"where": Choice(("controller", "observer")), "what": Choice(("exception", "base"))},
     ),
     "host.diverge": Kind(Diverge, "the observer diverges", {"factor": Number("", 1.001, 10, 1.5)}),

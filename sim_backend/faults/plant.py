@@ -27,7 +27,7 @@ class PlantFault(FaultModel):
 
 
 class Acting(Protocol):
-    """Whoever knows which faults are on."""
+    """The faults that are on."""
 
     @property
     def acting_on_plant(self) -> list[PlantFault]:
@@ -102,7 +102,7 @@ class FaultyEncoder(Encoder):
 
 
 class Stuck(PlantFault):
-    """Shows the last count for ever."""
+    """The encoder shows the last count for ever."""
 
     _shown: float | None = None
 
@@ -111,31 +111,31 @@ class Stuck(PlantFault):
         self._shown = None
 
     def count(self, counts: float) -> float:
-        """Show the first one again."""
+        """Return the first count again."""
         if self._shown is None:
             self._shown = counts
         return self._shown
 
 
 class Jump(PlantFault):
-    """Adds counts, `times` times, `every` periods apart, and they stay."""
+    """The encoder gains counts, `times` times, `every` periods apart, and they stay."""
 
     _age = -1
 
     def count(self, counts: float) -> float:
-        """Add what has come together."""
+        """Return the count with the jumps so far."""
         self._age += 1
         jumps = min(self._age // round(self.number("every")) + 1, round(self.number("times")))
         return counts + jumps * round(self.number("counts"))
 
 
 class Glitch(PlantFault):
-    """Shows a wrong count in one period in so many."""
+    """The encoder shows a wrong count in one period of `every`."""
 
     _age = -1
 
     def count(self, counts: float) -> float:
-        """Be wrong, or not."""
+        """Return the count, wrong in every `every`-th period."""
         self._age += 1
         ordinal, rest = divmod(self._age, round(self.number("every")))
         wrong = rest == 0 and ordinal < self.number("times")
@@ -143,21 +143,21 @@ class Glitch(PlantFault):
 
 
 class Noise(PlantFault):
-    """Adds Gaussian noise, in whole counts."""
+    """The encoder has Gaussian noise, in whole counts."""
 
     def count(self, counts: float) -> float:
-        """Add some."""
+        """Return the count with noise."""
         return counts + round(self.rng.gauss(0.0, self.number("counts")))
 
 
 class Missed(PlantFault):
-    """Loses counts for ever, each with probability p."""
+    """The encoder loses counts for ever, each with probability `p`."""
 
     _last: float | None = None
     _lost = 0
 
     def count(self, counts: float) -> float:
-        """Lose some of the new ones."""
+        """Return the count without those that were lost."""
         moved = 0 if self._last is None else round(counts - self._last)
         self._last = counts
         lost = sum(self.rng.random() < self.number("p") for _ in range(min(abs(moved), 1000)))
@@ -166,30 +166,30 @@ class Missed(PlantFault):
 
 
 class EncoderSign(PlantFault):
-    """Counts the other way from where it is."""
+    """The encoder counts the other way from where it is."""
 
     _from: float | None = None
 
     def count(self, counts: float) -> float:
-        """Mirror it."""
+        """Return the count mirrored at where it was first."""
         if self._from is None:
             self._from = counts
         return 2.0 * self._from - counts
 
 
 class Scale(PlantFault):
-    """Has so many times as many counts a revolution as anybody knows."""
+    """The encoder has `factor` times the counts a revolution that the rig says."""
 
     def count(self, counts: float) -> float:
-        """Count otherwise."""
+        """Return the count of the other encoder."""
         return math.floor(counts * self.number("factor") + 0.5)
 
 
 class Gain(PlantFault):
-    """The motor sees so many times the voltage: 0 without power, -1 with its wires swapped."""
+    """The motor sees `factor` times the voltage: 0 without power, -1 with its wires swapped."""
 
     def voltage(self, volts: float) -> float:
-        """Scale it."""
+        """Return the voltage times `factor`, V."""
         return volts * self.number("factor")
 
 
@@ -197,7 +197,7 @@ class Power(PlantFault):
     """The motor has no power."""
 
     def voltage(self, volts: float) -> float:  # noqa: ARG002
-        """Give none."""
+        """Return 0 V."""
         return 0.0
 
 
@@ -205,15 +205,15 @@ class MotorSign(PlantFault):
     """The motor's wires are swapped."""
 
     def voltage(self, volts: float) -> float:
-        """Turn it round."""
+        """Return the voltage with the other sign, V."""
         return -volts
 
 
 class Saturation(PlantFault):
-    """The power stage gives no more than so much, and nobody is told."""
+    """The power stage gives no more than `V`, and the reported voltage does not show it."""
 
     def voltage(self, volts: float) -> float:
-        """Cut it off."""
+        """Return the voltage, limited to `V`."""
         most = self.number("V")
         return max(-most, min(most, volts))
 
@@ -222,20 +222,20 @@ class Offset(PlantFault):
     """The power stage adds a voltage, while it is switched on or not."""
 
     def voltage(self, volts: float) -> float:
-        """Add it."""
+        """Return the voltage plus `V`."""
         return volts + self.number("V")
 
 
 class DeadBand(PlantFault):
-    """The power stage gives nothing below so much."""
+    """The power stage gives nothing below `V`."""
 
     def voltage(self, volts: float) -> float:
-        """Cut it out."""
+        """Return the voltage, 0 V below `V`."""
         return 0.0 if abs(volts) < self.number("V") else volts
 
 
 class Shove(PlantFault):
-    """Somebody pushes the arm, one way or the other."""
+    """The arm is pushed, one way or the other."""
 
     _volts = 0.0
 
@@ -268,7 +268,7 @@ PLANT = {
     "plant.dead_band": Kind(DeadBand, "the amplifier gives nothing below this", _VOLTS),
     "plant.shove": Kind(
         Shove,
-        "somebody pushes the arm",
+        "the arm is pushed",
         {"rad_s2": Number("rad/s2", 0, 1e5, 100), "way": Choice(("either", "up", "down"))},
     ),
 }

@@ -27,12 +27,12 @@ def _probability(default: float) -> Number:
 class WireFault(FaultModel):
     """A piece in, pieces out; on CAN a piece is a frame, its identifier in front."""
 
-    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
+    def __init__(self, facts: RigFacts, rng: random.RandomFault, **params: Value) -> None:
         super().__init__(facts, rng, **params)
         self._way = str(params.get("way", "both"))
 
     def affects(self, way: Way) -> bool:
-        """Whether it has a say in what travels that way now."""
+        """Whether it changes what travels that way now."""
         return self.on and self._way in ("both", way)
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
@@ -44,19 +44,19 @@ class WireFault(FaultModel):
         return []
 
 
-class Lucky(WireFault):
-    """Befalls a piece with probability p."""
+class RandomFault(WireFault):
+    """Changes each piece with probability `p`."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
-        """Leave most as they are."""
+        """Return most pieces as they are."""
         return self.spoil(piece) if self.rng.random() < self.number("p") else (piece,)
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:  # noqa: ARG002
-        """Return what becomes of one."""
+        """Return what becomes of a piece that is changed: nothing."""
         return ()
 
 
-class Drop(Lucky):
+class Drop(RandomFault):
     """Loses pieces, so many in a row."""
 
     _left: dict[Way, int]
@@ -66,7 +66,7 @@ class Drop(Lucky):
         self._left = {"up": 0, "down": 0}
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Lose it, or not."""
+        """Return nothing where a piece is lost."""
         if self._left[way] == 0 and self.rng.random() < self.number("p"):
             self._left[way] = round(self.number("burst"))
         if self._left[way]:
@@ -75,19 +75,19 @@ class Drop(Lucky):
         return (piece,)
 
 
-class Duplicate(Lucky):
+class Duplicate(RandomFault):
     """Sends a piece twice."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Double it."""
+        """Return the piece twice."""
         return piece, piece
 
 
-class Flip(Lucky):
+class Flip(RandomFault):
     """Turns bits over, never the delimiter's own: that is losing and inserting."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Turn some over."""
+        """Return the piece with bits turned over."""
         changed = bytearray(piece)
         end = len(piece) - (self.facts.carrier != "can")
         for place in self.rng.sample(range(8 * end), min(round(self.number("bits")), 8 * end)):
@@ -99,7 +99,7 @@ class Noise(WireFault):
     """Turns every bit over with the same small probability, those of a delimiter too."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
-        """Turn some over."""
+        """Return the piece with bits turned over."""
         changed, rate = bytearray(piece), self.number("rate")
         for place in range(8 * len(piece)):
             if self.rng.random() < rate:
@@ -107,43 +107,43 @@ class Noise(WireFault):
         return (bytes(changed),)
 
 
-class Truncate(Lucky):
+class Truncate(RandomFault):
     """Loses the last bytes of a piece, its delimiter first: two pieces merge."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Cut it off."""
+        """Return the piece without its end."""
         return (piece[: max(0, len(piece) - round(self.number("bytes")))],)
 
 
-class Insert(Lucky):
+class Insert(RandomFault):
     """Puts random bytes somewhere into a piece."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Cut it open."""
+        """Return the piece with bytes inside."""
         place = self.rng.randrange(len(piece) + 1)
         return (piece[:place] + self.rng.randbytes(round(self.number("bytes"))) + piece[place:],)
 
 
-class Garbage(Lucky):
+class Garbage(RandomFault):
     """Sends random bytes before a piece."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Put noise first."""
+        """Return noise, then the piece."""
         return self.rng.randbytes(round(self.number("bytes"))), piece
 
 
-class Garble(Lucky):
+class Garble(RandomFault):
     """Turns a piece into noise of its length, as another bit rate does."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
-        """Replace it."""
+        """Return noise of the same length."""
         return (self.rng.randbytes(len(piece)),)
 
 
 class Timed(WireFault):
     """Keeps pieces for later."""
 
-    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
+    def __init__(self, facts: RigFacts, rng: random.RandomFault, **params: Value) -> None:
         super().__init__(facts, rng, **params)
         self._now = 0
         self._waiting: dict[Way, list[tuple[int, bytes]]] = {"up": [], "down": []}
@@ -167,7 +167,7 @@ class Delay(Timed):
     """Every piece arrives later by the same time."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Keep it."""
+        """Return nothing now; the piece comes later."""
         self.keep(piece, way, self.periods("ms"))
         return ()
 
@@ -176,7 +176,7 @@ class Reorder(Timed):
     """Keeps a piece back until later ones have overtaken it."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Keep it, or not."""
+        """Return the piece, or keep it for later."""
         if self.rng.random() >= self.number("p"):
             return (piece,)
         self.keep(piece, way, 1 + self.rng.randrange(round(self.number("depth"))))
@@ -193,7 +193,7 @@ class Hold(Timed):
         self._until = self._now + self.periods("ms")
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Keep it while it lasts."""
+        """Return nothing while it lasts."""
         if self._now >= self._until:
             return (piece,)
         self.keep(piece, way, self._until - self._now)
@@ -206,7 +206,7 @@ class Unplug(FaultModel):
     _board: Board | None = None
 
     def tick(self, board: Board | None) -> None:
-        """Pull once."""
+        """Unplug the line in the first period."""
         if board is not None and self._board is None:
             self._board = board
             board.link(up=False)
@@ -268,6 +268,6 @@ WIRE = {
     "wire.hold": Kind(
         Hold, "silence, then a burst", {"ms": Number("ms", 1, 2000, 200), "way": _WAY}, wired=True
     ),
-    "wire.blackhole": Kind(Lucky, "nothing arrives", {"p": _probability(1.0), "way": _WAY}, wired=True),
+    "wire.blackhole": Kind(RandomFault, "nothing arrives", {"p": _probability(1.0), "way": _WAY}, wired=True),
     "wire.unplug": Kind(Unplug, "the line hangs up", wired=True),
 }
