@@ -27,7 +27,7 @@ def _probability(default: float) -> Number:
 class WireFault(FaultModel):
     """A piece in, pieces out; on CAN a piece is a frame, its identifier in front."""
 
-    def __init__(self, facts: RigFacts, rng: random.RandomFault, **params: Value) -> None:
+    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
         super().__init__(facts, rng, **params)
         self._way = str(params.get("way", "both"))
 
@@ -143,7 +143,7 @@ class Garble(RandomFault):
 class Timed(WireFault):
     """Keeps pieces for later."""
 
-    def __init__(self, facts: RigFacts, rng: random.RandomFault, **params: Value) -> None:
+    def __init__(self, facts: RigFacts, rng: random.Random, **params: Value) -> None:
         super().__init__(facts, rng, **params)
         self._now = 0
         self._waiting: dict[Way, list[tuple[int, bytes]]] = {"up": [], "down": []}
