@@ -97,3 +97,13 @@ def test_stop_request_leaves_the_handlers_alone_outside_the_main_thread() -> Non
     thread.start()
     thread.join(10.0)
     assert inside == before
+
+
+def test_second_interrupt_waits_where_files_are_written() -> None:
+    with StopRequest() as stop:
+        signal.raise_signal(signal.SIGINT)
+        with stop.held():
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert stop.exit_code == 0

@@ -11,11 +11,14 @@ from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.status import StatusLine
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.rerun_sink import Viewer
     from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.values import Event
 
 
 def status_line(period: float) -> Sink:
@@ -36,3 +39,59 @@ def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> 
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
 
     return RerunSink(rig=view, record=record, viewer=viewer, port=port)
+
+
+def dashboard_replacing(view: RigView, record: Path, viewer: Viewer, port: int) -> Sink:
+    """Return a dashboard whose recording takes the place of what is at `record` with the first period."""
+    from dcmp_hil.cli.outputs import place_beside
+
+    beside = place_beside(record)
+    if beside is None:
+        return dashboard(view, record, viewer, port)
+    return _Replacing(lambda: dashboard(view, beside, viewer, port), beside, record)
+
+
+class _Replacing:
+    """A sink whose file gets its name with the first period: a run that never begins replaces nothing.
+
+    Parameters
+    ----------
+    make
+        Makes the sink that writes.
+    beside, target
+        Where it writes to, and what that is called from the first period on.
+    """
+
+    def __init__(self, make: Callable[[], Sink], beside: Path, target: Path) -> None:
+        self._beside, self._target = beside, target
+        self._began = False
+        try:
+            self._sink = make()
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """What the sink goes on without."""
+        warnings: Sequence[str] = getattr(self._sink, "warnings", ())
+        return warnings
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        if not self._began and len(block):
+            self._began = True
+            self._beside.replace(self._target)
+        self._sink.block(block)
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        self._sink.event(event)
+
+    def close(self) -> None:
+        """Finish; without a period there is no file."""
+        try:
+            self._sink.close()
+        finally:
+            if not self._began:
+                self._beside.unlink(missing_ok=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import stat
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+_SUFFIX = 16  # characters of a name's ending that are kept
 _REMEDY = "Choose a file you may write, in a folder that exists."
 
 
@@ -95,6 +95,17 @@ def write_each(jobs: Sequence[tuple[Path | None, Callable[[Path], None]]]) -> tu
     return written, faults
 
 
+def place_beside(path: Path) -> Path | None:
+    """Return a name in the same folder, for a file that is to take the place of `path` at once.
+
+    None where that cannot be: for a device or a pipe, or a folder in which no file can be made.
+    """
+    place = Path(os.path.realpath(path))
+    if _is_special(path) or not os.access(place.parent, os.W_OK | os.X_OK):
+        return None
+    return place.with_name(f".{os.getpid()}{place.suffix[:_SUFFIX]}.part")
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file so that it holds what it did before, or all of `text`.
 
@@ -103,25 +114,18 @@ def write_text(path: Path, text: str) -> None:
     OSError, ValueError
         If it cannot be written.
     """
-    if _is_special(path):
+    beside = place_beside(path)
+    if beside is None:
         path.write_text(text, encoding="utf-8")
         return
     place = Path(os.path.realpath(path))
-    beside = place.with_name(f".{os.getpid()}.part")
     try:
-        file = beside.open("x", encoding="utf-8")
-    except OSError:  # a file that may be written in a folder that may not
-        path.write_text(text, encoding="utf-8")
-        return
-    try:
-        with file:
-            file.write(text)
+        beside.write_text(text, encoding="utf-8")
         if place.exists():
             beside.chmod(stat.S_IMODE(place.stat().st_mode))
         beside.replace(place)
     except BaseException:
-        with suppress(OSError):
-            beside.unlink()
+        beside.unlink(missing_ok=True)
         raise
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console
-from dcmp_hil.cli.onlookers import dashboard, recording, status_line
+from dcmp_hil.cli.onlookers import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
@@ -144,12 +144,16 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     if folder is not None:
         run, text = about(rig, options.note, options.faults), rig_json(rig)
         makers.append(partial(recording, folder.own, rig.period, run, text))
-    record = options.record or (folder.recording if folder else None)
     viewer = _viewer(options)
-    if record is not None or viewer != "none":
+    own = folder.recording if folder else None
+    if options.record is not None or own is not None or viewer != "none":
         from dcmp_hil.telemetry.rig_view import view_of
 
-        makers.append(partial(dashboard, view_of(rig), record, viewer, options.port))
+        view = view_of(rig)
+        if options.record is not None:
+            makers.append(partial(dashboard_replacing, view, options.record, viewer, options.port))
+        else:
+            makers.append(partial(dashboard, view, own, viewer, options.port))
     return makers
 
 
