@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.controllers.pd_compensated import PdSettings
-from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.limits import Limits
 from dcmp_hil.live.changes import LiveChanges, NoChanges
@@ -19,7 +18,9 @@ from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins import make_named
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver, FailureMonitor
+from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.probe import probe_for
 from dcmp_hil.supervisor import Supervisor
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
+    from dcmp_hil.plugins.checked import Failing
+    from dcmp_hil.plugins.roles import Role
     from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.values import Event
@@ -77,7 +80,11 @@ def assemble(
     changes = mailbox and LiveChanges(
         mailbox, trajectory, controller, observer, delay=rig.delay, notify=recorder.event
     )
-    supervisor = make_supervisor(rig, changes.event if changes else recorder.event)
+    stages = ((observer, rig.observer), (controller, rig.controller))
+    own = [stage for stage, section in stages if isinstance(section, Custom)]
+    supervisor = make_supervisor(
+        rig, changes.event if changes else recorder.event, cast("list[Failing]", own)
+    )
     line = Line(
         backend=backend,
         outliers=make_outliers(rig, supervisor),
@@ -97,30 +104,29 @@ def assemble(
 
 def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
     """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
-    setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
+    context = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
     observer: Observer = (
-        _make_custom(rig.observer, setting, "observer")
+        CheckedObserver(_make_custom(rig, rig.observer, OBSERVER, context), rig.observer.kind)
         if isinstance(rig.observer, Custom)
-        else rig.observer.build(setting)
+        else rig.observer.build(context)
     )
     if isinstance(rig.controller, PdSettings) and rig.controller.friction_feedforward:
-        return KnownFriction(observer, setting, trajectory.at, rig.delay)
+        return KnownFriction(observer, context, trajectory.at, rig.delay)
     return observer
 
 
 def make_controller(rig: Rig) -> Controller:
     """Make the controller that `[controller]` asks for."""
-    setting = controllers.ControllerContext(rig.model.values(), rig.period)
+    context = controllers.ControllerContext(rig.model.values(), rig.period)
     if isinstance(rig.controller, Custom):
-        custom: Controller = _make_custom(rig.controller, setting, "controller")
-        return custom
-    return rig.controller.build(setting)
+        return CheckedController(_make_custom(rig, rig.controller, CONTROLLER, context), rig.controller.kind)
+    return rig.controller.build(context)
 
 
-def make_supervisor(rig: Rig, notify: Callable[[Event], None]) -> Supervisor:
-    """Make the supervisor with the monitors that `[supervisor]` asks for."""
+def make_supervisor(rig: Rig, notify: Callable[[Event], None], own: Sequence[Failing] = ()) -> Supervisor:
+    """Make the supervisor with the monitors that `[supervisor]` asks for, and one for classes of `own`."""
     limits = rig.supervisor
-    monitors: list[Monitor] = [Finite()]
+    monitors: list[Monitor] = [FailureMonitor(own), Finite()] if own else [Finite()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
@@ -168,12 +174,5 @@ def make_outliers(rig: Rig, supervisor: Supervisor) -> Outliers:
     return Outliers(fastest, rig.period, rig.encoder.count, supervisor.stop_now)
 
 
-def _make_custom(section: Custom, setting: object, key: str) -> Any:
-    make = find_named(section.kind, f"{key}.kind")
-    try:
-        return make(setting, **section.options)
-    except TypeError as error:
-        raise ConfigError(
-            f"{key}.kind: {section.kind} could not be made: {error}. "
-            f"It is called as Class(context, **options) with the keys of [{key}.options]."
-        ) from error
+def _make_custom(rig: Rig, section: Custom, role: Role, context: object) -> Any:
+    return make_named(section.kind, role, rig.plugin_folders, (context,), section.options)

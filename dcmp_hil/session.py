@@ -209,7 +209,7 @@ class Session:
             trip.cycles = tuple(recorder.recent)
             end, why = _end_after(seen), f"{trip} "
             recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
-            raise trip from None
+            raise trip from seen.__cause__
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))

@@ -16,6 +16,7 @@ from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.references.periodic import Sine
 from dcmp_hil.trajectory import Trajectory
 from tests.helpers import STEADY, bench, figures, known, named
@@ -51,16 +52,16 @@ def test_observer_of_ones_own_gets_its_setting_and_its_options() -> None:
     made = _observer(
         f"observer.kind={named(_Mine)}", "observer.options.gain=7.0", "model.f0_1_s=0.3", "loop.rate_hz=2000"
     )
-    assert isinstance(made, _Mine)
-    assert made.gain == 7.0
-    assert made.setting == ObserverContext(Model(f0=0.3), 0.0005, 4096.0)
+    assert isinstance(made, CheckedObserver)
+    assert made.inner.gain == 7.0
+    assert made.inner.setting == ObserverContext(Model(f0=0.3), 0.0005, 4096.0)
 
 
 def test_controller_of_ones_own_gets_its_setting_and_its_options() -> None:
     made = make_controller(bench(f"controller.kind={named(_Mine)}", "controller.options.gain=-1"))
-    assert isinstance(made, _Mine)
-    assert made.gain == -1
-    assert made.setting == ControllerContext(Model(), 0.001)
+    assert isinstance(made, CheckedController)
+    assert made.inner.gain == -1
+    assert made.inner.setting == ControllerContext(Model(), 0.001)
 
 
 @pytest.mark.parametrize("stage", ["observer", "controller"])

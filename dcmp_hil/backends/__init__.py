@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from dcmp_hil.backends.kinds import KINDS
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins import find_named, make
+from dcmp_hil.plugins.checked import CheckedBackend
+from dcmp_hil.plugins.roles import BACKEND
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,10 +70,20 @@ def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS) -> Backend:
         If there is none by that name, or it is a real device and the rig or the clock is not for one.
     """
     kind = rig.backend.kind
-    factory: Callable[..., Backend] = find_named(KINDS.get(kind, kind), "backend.kind", KINDS)
+    if kind in KINDS:
+        return faults.backend(_allowed(find_named(KINDS[kind], BACKEND.key), rig, clock), rig, clock)
+    own = _allowed(find_named(kind, BACKEND.key, KINDS, rig.plugin_folders), rig, clock)
+
+    def checked(*arguments: Any, **options: Any) -> Backend:
+        return CheckedBackend(make(own, kind, BACKEND, arguments, options), kind)
+
+    return faults.backend(checked, rig, clock)
+
+
+def _allowed(factory: Callable[..., Any], rig: Rig, clock: Clock) -> Callable[..., Any]:
     if not getattr(factory, "simulated", False):
         _refuse_simulation_only(rig, clock)
-    return faults.backend(factory, rig, clock)
+    return factory
 
 
 def _refuse_simulation_only(rig: Rig, clock: Clock) -> None:

@@ -12,8 +12,10 @@ def check(rig: RigName, overrides: Overrides = None) -> None:
 
     from dcmp_hil.config import load_rig
     from dcmp_hil.config.explain import explain, warnings
+    from dcmp_hil.config.named import check_named
 
     loaded = load_rig(rig, overrides or ())
+    check_named(loaded)
     terminal = console.out.is_terminal
     for key, value, meaning in explain(loaded):
         line = Text.assemble(f"{key:36}", (f"{value:18}", "bold"), (f" {meaning}", "dim"))

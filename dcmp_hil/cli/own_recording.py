@@ -86,9 +86,8 @@ def _changed(rig: Rig, overrides: Sequence[str]) -> Rig | None:
                 f"--set {override}: what was measured stays as it was; only keys of "
                 f"{', '.join(_MAY_CHANGE)} can be changed afterwards."
             )
-    return load_table(
-        json.loads(json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str)), overrides
-    )
+    table = json.loads(json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str))
+    return load_table(table, overrides, rig.folder)
 
 
 def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Table:

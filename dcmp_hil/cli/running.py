@@ -142,7 +142,7 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     """Everybody who looks on: status line, the run's own recording, and Rerun with a viewer or a file."""
     makers: list[SinkMaker] = [partial(status_line, rig.period)]
     if folder is not None:
-        run, text = about(rig, options.note, options.faults), rig_json(rig)
+        run, text = about(rig, options.note, options.faults, folder.path), rig_json(rig)
         makers.append(partial(recording, folder.own, rig.period, run, text))
     viewer = _viewer(options)
     own = folder.recording if folder else None

@@ -55,15 +55,17 @@ def load_rig(source: str | Path, overrides: Sequence[str] = ()) -> Rig:
     return _checked(table, place, folder, overrides)
 
 
-def load_table(table: dict[str, Any], overrides: Sequence[str] = ()) -> Rig:
+def load_table(table: dict[str, Any], overrides: Sequence[str] = (), folder: Path | None = None) -> Rig:
     """Check a rig that is there as a table already, as a recording has it; see `load_rig`.
+
+    `folder` is where the file of the rig was, for classes of the user's own.
 
     Raises
     ------
     ConfigError
         With every fault found.
     """
-    return _checked(table, "the recording", None, overrides)
+    return _checked(table, "the recording", None, overrides).in_folder(folder)
 
 
 def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: Sequence[str]) -> Rig:
@@ -72,7 +74,10 @@ def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: 
         rig = Rig.model_validate(table)
     except ValidationError as error:
         raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
-    return rig if folder is None else _with_reference_file(rig, folder, place, set_keys)
+    if folder is None:
+        return rig
+    rig = _with_reference_file(rig, folder, place, set_keys)
+    return rig if folder == Path() else rig.in_folder(folder.absolute())
 
 
 def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:
@@ -86,7 +91,7 @@ def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:
     table = rig.model_dump(exclude_unset=True)
     set_keys = apply_overrides(table, overrides)
     try:
-        return Rig.model_validate(table)
+        return Rig.model_validate(table).in_folder(rig.folder)
     except ValidationError as error:
         raise ConfigError(*explain_faults(error, table, rig.name, set_keys)) from None
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from dcmp_hil.config.backends import Can, CustomBackend, Serial, Sim, SimBoard
 from dcmp_hil.config.rules import RULES
@@ -91,6 +92,24 @@ class Rig(Section):
     timing: TimingSection = TimingSection()
     run: RunSection = RunSection()
     sim: SimSection = SimSection()
+
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of the rig's file; None for a shipped rig."""
+        return self._folder
+
+    def in_folder(self, folder: Path | None) -> Rig:
+        """Return the same rig as from a file in that folder."""
+        rig = self.model_copy()
+        rig._folder = folder  # noqa: SLF001 - its own
+        return rig
+
+    @property
+    def plugin_folders(self) -> tuple[Path, ...]:
+        """Where a `module:Class` is looked for beside what is installed."""
+        return (Path(),) if self._folder is None else (self._folder, Path())
 
     @property
     def period(self) -> float:

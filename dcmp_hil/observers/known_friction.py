@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.errors import TripError
     from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.values import Estimate, Reference, Sample
@@ -51,6 +52,12 @@ class KnownFriction:
         self._t = sample.t
         rest = self._observer.update(sample._replace(voltage=sample.voltage + held * self._volts))
         return rest._replace(disturbance=rest.disturbance + self._friction(sample.t + self._ahead))
+
+    @property
+    def trip(self) -> TripError | None:
+        """Why an observer of the user's own failed; None while it has not."""
+        found: TripError | None = getattr(self._observer, "trip", None)
+        return found
 
     def retune(self, tuning: Tuning) -> None:
         """Retune the observer that finds the rest."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import __version__
 from dcmp_hil.clock import utc_now
+from dcmp_hil.config.named import names_a_class
 from dcmp_hil.host import host_facts
 from dcmp_hil.recording.layout import FORMAT
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -22,9 +24,13 @@ if TYPE_CHECKING:
 _GIT_S = 2.0
 
 
-def about(rig: Rig, note: str = "", faults: Sequence[str] = ()) -> dict[str, str]:
-    """Return everything that is known before a run, in words; facts of the computer as JSON."""
-    return {
+def about(rig: Rig, note: str = "", faults: Sequence[str] = (), folder: Path | None = None) -> dict[str, str]:
+    """Return everything that is known before a run, in words; facts of the computer as JSON.
+
+    Where the rig names a class of the user's own, `rig_folder` is the folder of the rig's file, as a path
+    from `folder`, which the recording is in.
+    """
+    known = {
         "format": FORMAT,
         "version": __version__,
         "rig": rig.name,
@@ -35,6 +41,9 @@ def about(rig: Rig, note: str = "", faults: Sequence[str] = ()) -> dict[str, str
         "git": git_state(Path(__file__).parent),
         "host": json.dumps(host_facts()),
     }
+    if folder is not None and names_a_class(rig):
+        known["rig_folder"] = os.path.relpath(rig.plugin_folders[0], folder)
+    return known
 
 
 def rig_json(rig: Rig) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.live.mailbox import Mailbox
 from dcmp_hil.predictor import Predictor
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.errors import TripError
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.values import Estimate, Event
 
@@ -57,6 +59,11 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
         The run.
     rig
         Another observer or controller; None takes those of the run.
+
+    Raises
+    ------
+    ConfigError
+        If a class of the user's own cannot be made, or fails in a period that the run survived.
     """
     rig = rig or recorded.rig
     trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
@@ -79,7 +86,18 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
         if made and made[0][0] == sample.t:
             mailbox.put(made.popleft()[1])
         changes.apply(sample.t)
-    return Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+    again = Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+    _check_own(again, observer, controller)
+    return again
+
+
+def _check_own(again: Again, *stages: object) -> None:
+    """Refuse what a class of the user's own failed at, unless the recorded run ended there."""
+    failed = np.isnan(again.demand) | np.isnan(again.estimate).any(axis=1)
+    for stage in stages:
+        trip: TripError | None = getattr(stage, "trip", None)
+        if trip is not None and trip.reason == "plugin" and failed[:-1].any():
+            raise ConfigError(f"period {int(np.argmax(failed)) + 1}: {trip}") from trip.__cause__
 
 
 def _nobody(_: Event) -> None:

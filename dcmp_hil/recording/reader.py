@@ -104,14 +104,20 @@ def _read(path: Path, file: IO[bytes]) -> RecordedRun:
             found.rig = json.loads(record.data)
     if found.run is None or found.rig is None:
         raise ConfigError(f"{path}: this is no recording of dcmp-hil, or its very beginning is missing.")
+    rig = _rig(path, found.run, found.rig)
+    rows = np.array(found.rows) if found.rows else np.empty((0, len(FIELDS)))
+    return RecordedRun(path, rig, found.run, rows, tuple(found.events), found.complete)
+
+
+def _rig(path: Path, run: dict[str, str], table: dict[str, Any]) -> Rig:
+    """Return the rig, which finds its classes where the run did as long as both lie as they lay then."""
     try:
-        rig = Rig.model_validate(found.rig)
+        rig = Rig.model_validate(table)
     except ValidationError as error:
         raise ConfigError(
             f"{path}: its rig is not one of this version ({error.error_count()} keys differ)."
         ) from None
-    rows = np.array(found.rows) if found.rows else np.empty((0, len(FIELDS)))
-    return RecordedRun(path, rig, found.run, rows, tuple(found.events), found.complete)
+    return rig.in_folder(path.parent / run["rig_folder"]) if "rig_folder" in run else rig
 
 
 def _records(file: IO[bytes], found: _Found) -> Iterator[Any]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from dcmp_hil.model import Model
 from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins import find_named, make
+from dcmp_hil.plugins.checked import CheckedObserver
+from dcmp_hil.plugins.roles import OBSERVER
 from dcmp_hil.replay.resolution import equivalent_counts_per_rev, estimate_counts_per_rev
 from dcmp_hil.replay.settings import IDEAL, ReplaySettings
 
@@ -122,13 +125,9 @@ def _make(settings: ReplaySettings, setting: ObserverContext) -> Observer:
     if settings.observer == "paper":
         M = _PAPER_M if settings.M is None else settings.M
         return PaperObserver(setting, L1=settings.L1, L2=settings.L2, M=M)
-    make = find_named(settings.observer, "--observer", ("super_twisting", "paper"))
-    try:
-        return cast("Observer", make(setting))
-    except TypeError as error:
-        raise ConfigError(
-            f"--observer: {settings.observer} could not be made: {error}. It is called as Class(context)."
-        ) from error
+    find = find_named(settings.observer, "--observer", ("super_twisting", "paper"), (Path(),))
+    role = OBSERVER._replace(key="--observer", call="Class(context)")
+    return CheckedObserver(make(find, settings.observer, role, (setting,), {}), settings.observer)
 
 
 def _over_the_step_before(values: NDArray[np.float64], settings: ReplaySettings) -> NDArray[np.float64]:
