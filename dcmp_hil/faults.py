@@ -44,6 +44,10 @@ _MEANINGS = {
         "The board found something wrong with itself",
         "firmware/README.md says what its detail means: 1 no crystal, 2 nobody wrote its record, ...",
     ),
+    Fault.TWO_DEVICES: Meaning(
+        "Two devices send under this node: one is in RUN, the other is not",
+        "Unplug one, or build its firmware with another node (backend.node then says which of them to run).",
+    ),
     Fault.DISARMED: Meaning(
         "The device left RUN by itself and names no fault, as after a reset",
         "Look at its supply (brown-out?) and at its reset button.",

@@ -18,6 +18,7 @@ class Fault(IntEnum):
     ENCODER_JUMP = 7
     BREAK_INPUT = 8  # the amplifier's own protection
     INTERNAL = 9  # the board found something wrong with itself
+    TWO_DEVICES = 253  # two devices send under one node; never on the wire
     DISARMED = 254  # the device left RUN without a fault, as after a reset; never on the wire
     UNKNOWN = 255  # a code that this version does not know: treated like any other fault
 

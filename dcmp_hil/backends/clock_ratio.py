@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from statistics import median
+from statistics import median, quantiles
 
 _WINDOW = 256  # ticks
+_QUIET = 2.5e-3  # of a slope: a spread that says nothing against the median
 _FEWEST, _MOST = 4, 512  # slopes: fewer say nothing, more would add nothing
 
 
@@ -40,10 +41,13 @@ class ClockRatio:
 
     @property
     def error(self) -> float | None:
-        """How much the device's clock is fast, as a share: -0.02 is 2 % slow; None before it is known."""
+        """How much the device's clock is fast, as a share: -0.02 is 2 % slow; None if not known."""
         if len(self._slopes) < _FEWEST:
             return None
         longer = median(self._slopes)  # a nominal period takes so much longer than it should
+        first, _, third = quantiles(self._slopes, n=4)
+        if third - first > max(abs(longer), _QUIET):
+            return None  # this computer stood still too often to tell
         return 1.0 / (1.0 + longer) - 1.0
 
     def _close_window(self, tick: int) -> None:

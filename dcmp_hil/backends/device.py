@@ -9,6 +9,7 @@ from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import MOST_WAITING, Caller
 from dcmp_hil.backends.goodbye import DeviceEnd, Goodbye
 from dcmp_hil.backends.handshake import Handshake
+from dcmp_hil.backends.left_run import another_runs, why_left
 from dcmp_hil.backends.link_meter import LinkMeter
 from dcmp_hil.backends.terms import Terms
 from dcmp_hil.errors import BackendError, LinkError, TripError
@@ -33,7 +34,6 @@ _SEQ = 0x1FFF
 _RUN = int(State.RUN)
 _HEALTHY = Fault.NONE  # found here faster than in its class
 _MOST_mV = 32_767.0  # what 16 bits hold
-_OTHER_FAULT = 7  # fault_class that only says: see FAULT
 _MOST_LOST = 127  # periods that a tick of 8 bits can bridge
 _SURELY_NS = 200_000_000  # after which any watchdog has acted
 _SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: the end
@@ -67,6 +67,7 @@ class DeviceBackend:
         self._has_count = False
         self._t = 0.0
         self._fault: int = Fault.NONE
+        self._left = 0  # the fault that ended RUN
         self._ttl_ms = terms.watchdog_ms
         self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2
         """Periods for which the device goes on with a command."""
@@ -77,8 +78,7 @@ class DeviceBackend:
         self._meter = LinkMeter(link, 1e9 * rig.period)
         self._rates = terms.warn_share, terms.warn_clock_share
         self.firmware = self._cleared = ""
-        self.remarks: tuple[str, ...] = ()
-        """What a person should know of this device, once it is open."""
+        self.remarks: tuple[str, ...] = ()  # what a person should know of this device
         self.device_end: DeviceEnd | None = None  # how it was left, as far as it said so
 
     def __enter__(self) -> Self:
@@ -166,13 +166,14 @@ class DeviceBackend:
         """
         if not self._open:
             raise LinkError("The device is not open. Use it as a context manager: with backend: ...")
+        last = self._tick
         report = self._next_report()
         _, voltage_mV, _, state, _, _, _ = report
         if state == _RUN and self._tick - self._answered > self._memory:
             raise refusals.taken_over(self._link.name)
         terms = self._terms
         position = (self._count - self._zero) * terms.rad_per_count
-        fault = _HEALTHY if state == _RUN else self._fault_in(report)
+        fault = _HEALTHY if state == _RUN else self._fault_in(report, last)
         return make(Sample, (self._t, position, voltage_mV / terms.mV_per_V, fault))
 
     def write(self, voltage: float) -> None:
@@ -271,12 +272,12 @@ class DeviceBackend:
         self._count = nearest(zero or 0, raw, 24)  # near the counter's wrap it matters
         self._zero = self._count if zero is None else zero
 
-    def _fault_in(self, report: SampleReport) -> int:
-        if report.fault_class == Fault.NONE:
-            return Fault.DISARMED
-        if report.fault_class < _OTHER_FAULT:
-            return report.fault_class
-        return self._fault or Fault.UNKNOWN
+    def _fault_in(self, report: SampleReport, last: int) -> int:
+        """Return the fault of a device that is not in RUN; `last` is the tick at which it was."""
+        if not self._left:
+            another = another_runs(self._link, self._clock, self._node, (last, report.tick), self._period)
+            self._left = Fault.TWO_DEVICES if another else why_left(report, self._fault)
+        return self._left
 
     def _give_up(self, damaged: int, stale: int) -> NoReturn:
         self._link.send(pack(Stop(StopReason.NO_SAMPLE), self._node))

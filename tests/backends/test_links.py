@@ -181,3 +181,16 @@ def test_whatever_a_driver_raises_is_one_line_with_its_own_remedy(
     said = complaint(can_link(interface, "0"), OpenError)
     assert remedy in said
     assert ("ip link" in said) == (interface == "socketcan")
+
+
+def test_error_frames_of_a_can_bus_count_as_damage() -> None:
+    near = can_link("virtual", "errors")
+    near.open()
+    with can.Bus(channel="errors", interface="virtual", ignore_config=True) as far:
+        for _ in range(3):
+            far.send(can.Message(is_error_frame=True, is_extended_id=False))
+        far.send(can.Message(arbitration_id=0x40, data=bytes(8), is_extended_id=False))
+        assert near.receive(1.0) == (0x40, bytes(8))
+    assert near.corrupt == 3
+    near.close()
+    assert near.corrupt == 3

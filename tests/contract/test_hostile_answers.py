@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.errors import ConfigError, OpenError
+from dcmp_hil.values import Fault
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import (
     Drive,
@@ -227,6 +228,32 @@ def test_another_fault_in_its_place_is_not_cleared(code: int) -> None:
 
 
 # ----------------------------------------------------------------------------------------- two devices
+
+
+@pytest.mark.parametrize("first_tick", [0, 100, 1000])
+def test_second_device_that_is_plugged_in_during_a_run_is_told_as_that(first_tick: int) -> None:
+    with (
+        on_bench("sim-board can") as bench,
+        on_bench("sim-board can", first_tick=first_tick) as other,
+        bench.device() as backend,
+    ):
+        drive(backend, 1.0, 50)
+        send = bench.board.transmit_frames
+
+        def both() -> list[Frame]:
+            other.board.tick()
+            return send() + other.board.transmit_frames()
+
+        bench.board.transmit_frames = both  # type: ignore[method-assign]
+        faults = [sample.fault for sample in drive(backend, 1.0, 3)]
+        assert faults[-1] == Fault.TWO_DEVICES
+
+
+def test_device_that_is_reset_is_not_two() -> None:
+    with on_bench("sim-board can") as bench, bench.device() as backend:
+        drive(backend, 1.0, 50)
+        bench.board.reset()
+        assert drive(backend, 1.0, 3)[-1].fault == Fault.DISARMED
 
 
 def test_two_devices_with_one_node_are_told_as_that() -> None:

@@ -142,7 +142,7 @@ def test_unknown_numbers_are_ignored() -> None:
         (Parameter, "PARAMETER_SET.id", {}),
         (Parameter, "PARAMETER_VALUE.id", {}),
         (Result, "PARAMETER_VALUE.result", {}),
-        (Fault, "FAULT.code", {"DISARMED": 254, "UNKNOWN": 255}),
+        (Fault, "FAULT.code", {"TWO_DEVICES": 253, "DISARMED": 254, "UNKNOWN": 255}),
     ],
 )
 def test_names_of_values(kind: type[IntEnum], field: str, extra: dict[str, int]) -> None:
