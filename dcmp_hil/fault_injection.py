@@ -71,7 +71,7 @@ def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Faults:
     ConfigError
         With everything that is wrong with them.
     """
-    listed = tuple(faults)
+    listed = (faults,) if isinstance(faults, str) else tuple(faults)
     if not listed:
         return NO_FAULTS
     prepare: Callable[..., Faults] = find_named(_INJECT, key)

@@ -66,7 +66,7 @@ def needs_wire(faults: Iterable[str | Fault]) -> bool:
     return any(kind in KINDS and KINDS[kind].wired for kind in named)
 
 
-def inject(rig: Rig, faults: Iterable[str | Fault], key: str = "faults:") -> Injector:
+def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Injector:
     """Prepare faults for one run of a rig; their seed is the simulation's.
 
     Parameters
@@ -87,7 +87,7 @@ def inject(rig: Rig, faults: Iterable[str | Fault], key: str = "faults:") -> Inj
     wrong: list[str] = []
     for fault in faults:
         try:
-            made.append(Fault.of(fault) if isinstance(fault, str) else fault)
+            made.append(_read(fault))
         except WrongFaultError as error:
             wrong += error.faults
     if not wrong:
@@ -96,6 +96,14 @@ def inject(rig: Rig, faults: Iterable[str | Fault], key: str = "faults:") -> Inj
         except ConfigError as error:
             wrong += error.faults
     raise ConfigError(*(f"{key} {sentence}" for sentence in wrong))
+
+
+def _read(fault: object) -> Fault:
+    if isinstance(fault, Fault):
+        return fault
+    if isinstance(fault, str):
+        return Fault.of(fault)
+    raise WrongFaultError([f"got {fault!r}; expected a text such as wire.drop:p=0.2,at=3s, or a Fault."])
 
 
 def _facts(rig: Rig) -> RigFacts:

@@ -144,6 +144,14 @@ def test_a_run_with_faults_of_the_host_can_be_changed_while_it_goes_on(backend: 
     assert answer.what == APPLIED
 
 
+def test_what_is_no_fault_is_refused_in_words() -> None:
+    with pytest.raises(ConfigError, match="faults: got 42; expected a text") as caught:
+        run(bench(BOARD), duration=0.1, fast=True, faults=[42, "wire.drp"])
+    assert len(caught.value.faults) == 2
+    with pytest.raises(ConfigError, match=r'Did you mean "wire\.drop"'):
+        run(bench(BOARD), duration=0.1, fast=True, faults="wire.drp")
+
+
 def test_a_rig_is_the_same_object_whatever_goes_wrong() -> None:
     rig = bench(BOARD, QUICK)
     before = pickle.dumps(rig)
