@@ -179,7 +179,7 @@ class Custom(Section):
     """An observer or a controller of your own: `kind = "module:Class"`, made as Class(context, **options)."""
 
     kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$", examples=["my_lab.rig:Mine"])]
-    """`module:Class`; the module must be importable from where the run is started."""
+    """`module:Class`; the module is installed, or beside the rig file, or in the current folder."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Handed to the class as keyword arguments."""
 
