@@ -222,5 +222,5 @@ def _check_rising(text: Text, time: NDArray[np.float64], name: str) -> None:
         k = int(stuck[0])
         raise ConfigError(
             f"{text.place(k + 1)}: {name} goes from {time[k]:.9g} to {time[k + 1]:.9g}; time must rise from "
-            "row to row. Sort the rows, or remove the repeated ones."
+            "row to row. Write the rows in the order of their times, one position for each."
         )

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from dcmp_hil.cli.replay_options import Given
+    from dcmp_hil.cli.replaying import Outputs
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.compare import Comparison
     from dcmp_hil.recording.reader import RecordedRun
@@ -48,24 +50,52 @@ def write_exports(file: Path, *, csv: Path | None, parquet: Path | None, rrd: Pa
         raise ConfigError(*faults)
 
 
-def replay_own(file: Path, overrides: Sequence[str], json_file: str | None) -> None:
+def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
     """Run observer and controller over a recording again, and compare.
 
     Raises
     ------
     ConfigError
-        If the recording cannot be read, or an override is none of observer, controller or model.
+        If the recording cannot be read, an option says what a run knows itself, or an override is none of
+        observer, controller or model.
     """
-    try_places({"--json": json_place(json_file)}, {"the recording": recording_in(file)})
+    refused = given.refused_of_a_run()
+    if refused:
+        raise ConfigError(
+            f"{', '.join(refused)}: for a CSV file only; a run of dcmp-hil knows its columns, units, "
+            "sampling and rig. Leave it out. Other gains: --observer, --mu0, --M, --L1, --L2, --f0, --ku, "
+            "--set KEY=VALUE."
+        )
+    json_file = json_place(outputs.json)
+    places = {"--csv": outputs.csv, "--rrd": outputs.rrd, "--json": json_file}
+    try_places(places, {"the recording": recording_in(file)})
     run = _read(file)
     if not len(run.rows):
         raise ConfigError(f"{run.path}: no period is in it.")
-    result = compare(run, run_again(run, _changed(run.rig, overrides)))
-    if json_file is not None:
-        figures = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
-        console.write_json(json_file, {"identical": result.identical, "rows": result.rows, **figures})
-    if json_file != "-":
-        console.out.print(_table(run, overrides, result))
+    keys, start = given.keys(), given.figures.get("start") or 0.0
+    lasted = float(run.rows[-1, 0] - run.rows[0, 0])
+    if start and not 0.0 <= start < lasted:
+        raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
+    again = run_again(run, _changed(run.rig, keys))
+    result = compare(run, again, start)
+    lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
+    figures = {"identical": result.identical, "rows": result.rows, **lines}
+    written, faults = write_each(
+        [
+            (outputs.csv, partial(export.again_to_csv, run, again)),
+            (outputs.rrd, partial(export.again_to_rrd, run, again)),
+            (json_file, lambda path: console.write_json(str(path), figures)),
+        ]
+    )
+    if outputs.json == "-":
+        console.write_json("-", figures)
+    else:
+        console.out.print(_table(run, keys, result))
+    for path in written:
+        if path != json_file:
+            console.note(f"wrote {path}")
+    if faults:
+        raise ConfigError(*faults)
 
 
 def _read(file: Path) -> RecordedRun:

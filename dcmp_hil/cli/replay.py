@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
-from dcmp_hil.cli.options import JsonFile, Overrides
-from dcmp_hil.errors import ConfigError
+from dcmp_hil.cli.options import JsonFile
 
 _COLUMNS = "Columns and units (found by name where not given)"
+_FILE = "What the file does not say"
 _OBSERVER = "Observer and rig"
 _FIGURES = "Figures"
 _OUTPUT = "Output"
@@ -24,9 +24,11 @@ class InputAt(StrEnum):
     END = "end"
 
 
-def _column(quantity: str, *more: str) -> Any:
-    flags = (f"--{quantity}", f"--{quantity}-column", *more)
-    return typer.Option(*flags, metavar="COLUMN", help=f"Column of the {quantity}.", rich_help_panel=_COLUMNS)
+def _column(quantity: str, more: str = "") -> Any:
+    flags = (f"--{quantity}", f"--{quantity}-column")
+    return typer.Option(
+        *flags, metavar="COLUMN", help=f"Column of the {quantity}{more}.", rich_help_panel=_COLUMNS
+    )
 
 
 def _unit(quantity: str, units: str) -> Any:
@@ -41,27 +43,66 @@ def _number(*flags: str, unit: str, text: str, panel: str = _OBSERVER) -> Any:
 
 def replay(  # noqa: PLR0913 - typer reads the options from the signature
     file: Annotated[
-        Path, typer.Argument(metavar="FILE.csv", help="Recording with time, position, torque or voltage.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="CSV recording with time, position, torque or voltage; or a run of dcmp-hil."
+        ),
     ],
     *,
-    overrides: Overrides = None,
-    time: Annotated[str | None, _column("time")] = None,
+    time: Annotated[str | None, _column("time", "; none; or seconds+nanoseconds")] = None,
     position: Annotated[str | None, _column("position")] = None,
-    torque: Annotated[str | None, _column("torque")] = None,
-    voltage: Annotated[str | None, _column("voltage")] = None,
-    velocity: Annotated[str | None, _column("velocity")] = None,
+    torque: Annotated[str | None, _column("torque", "; or none")] = None,
+    voltage: Annotated[str | None, _column("voltage", "; or none")] = None,
+    velocity: Annotated[str | None, _column("velocity", "; or none")] = None,
     time_unit: Annotated[str | None, _unit("time", "s, ms, us, ns")] = None,
     position_unit: Annotated[str | None, _unit("position", "rad, mrad, deg, rev, counts")] = None,
     torque_unit: Annotated[str | None, _unit("torque", "Nm, mNm, Ncm")] = None,
     voltage_unit: Annotated[str | None, _unit("voltage", "V, mV")] = None,
     velocity_unit: Annotated[str | None, _unit("velocity", "rad/s, deg/s, rev/s, rpm")] = None,
-    input_at: Annotated[
-        InputAt,
-        typer.Option(
-            help="Row that holds the input over [k-1, k): start = row k-1, end = row k.",
-            rich_help_panel=_COLUMNS,
+    period: Annotated[
+        float | None,
+        _number(
+            "--period",
+            unit="S",
+            panel=_FILE,
+            text="The rows are evenly sampled, so far apart; a time column then tells only which were lost.",
         ),
-    ] = InputAt.START,
+    ] = None,
+    no_input: Annotated[
+        bool,
+        typer.Option("--no-input", help="Nothing was applied: the arm swung freely.", rich_help_panel=_FILE),
+    ] = False,
+    modulus: Annotated[
+        str | None,
+        _number(
+            "--modulus",
+            unit="N",
+            panel=_FILE,
+            text="After how many of its units the position wraps (65536 counts); or none. Default: found.",
+        ),
+    ] = None,
+    input_at: Annotated[
+        InputAt | None,
+        typer.Option(
+            help="Row that holds the input over [k-1, k): start = row k-1 (default), end = row k.",
+            rich_help_panel=_FILE,
+        ),
+    ] = None,
+    rig: Annotated[
+        str | None,
+        _number(
+            "--rig", unit="RIG", text="Take observer, model and encoder from this rig. Default: the paper's."
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Override a key of the rig: observer.*, model.*. Repeatable.",
+            rich_help_panel=_OBSERVER,
+        ),
+    ] = None,
     inertia: Annotated[
         float | None,
         _number(
@@ -77,14 +118,15 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
             "--counts-per-rev", "--counts", unit="N", text="Encoder, for mu0; or ideal. Default: estimated."
         ),
     ] = None,
-    period: Annotated[
-        float | None,
-        _number("--period", unit="S", text="Nominal sampling period T. Default: the median step."),
-    ] = None,
     observer: Annotated[
-        str, _number("--observer", unit="NAME", text="super_twisting, paper, or module:Class of your own.")
-    ] = "super_twisting",
-    f0: Annotated[float, _number("--f0", unit="1/S", text="Viscous friction over inertia.")] = 0.1,
+        str | None,
+        _number(
+            "--observer", unit="NAME", text="super_twisting (default), paper, or module:Class of your own."
+        ),
+    ] = None,
+    f0: Annotated[
+        float | None, _number("--f0", unit="1/S", text="Viscous friction over inertia. Default 0.1.")
+    ] = None,
     mu0: Annotated[
         float | None,
         _number(
@@ -95,28 +137,35 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         float | None,
         _number("--M", unit="RAD/S3", text="Differentiator gain. Default: super_twisting 15, paper 1000."),
     ] = None,
-    L1: Annotated[float, _number("--L1", unit="1/S", text="Copy gain.")] = 4.9,
-    L2: Annotated[float, _number("--L2", unit="1/S2", text="Copy gain.")] = 5.51,
+    L1: Annotated[float | None, _number("--L1", unit="1/S", text="Copy gain. Default 4.9.")] = None,
+    L2: Annotated[float | None, _number("--L2", unit="1/S2", text="Copy gain. Default 5.51.")] = None,
     window_from: Annotated[
-        float,
+        float | None,
         _number(
             "--from",
             unit="S",
             panel=_FIGURES,
-            text="Judge what is later than this, and so after every restart.",
+            text="Judge what is later than this, and so after every restart. Default 0.3; of a run 0.",
         ),
-    ] = 0.3,
+    ] = None,
     cutoff: Annotated[
-        float, _number("--cutoff", unit="HZ", panel=_FIGURES, text="Corner of the zero-phase reference.")
-    ] = 15.0,
+        float | None,
+        _number(
+            "--cutoff", unit="HZ", panel=_FIGURES, text="Corner of the zero-phase reference. Default 15."
+        ),
+    ] = None,
     json_file: JsonFile = None,
     csv: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Default: <FILE>-replay.csv here.", rich_help_panel=_OUTPUT),
+        typer.Option(
+            metavar="FILE", help="Default: <FILE>-replay.csv here; of a run none.", rich_help_panel=_OUTPUT
+        ),
     ] = None,
     rrd: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Default: <FILE>-replay.rrd here.", rich_help_panel=_OUTPUT),
+        typer.Option(
+            metavar="FILE", help="Default: <FILE>-replay.rrd here; of a run none.", rich_help_panel=_OUTPUT
+        ),
     ] = None,
     no_write: Annotated[
         bool, typer.Option("--no-write", help="Write only the files named.", rich_help_panel=_OUTPUT)
@@ -126,60 +175,34 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
 
     Uneven sampling and lost samples are fine: every step takes the measured time. Columns are found by name
     (time, position, torque ...), units by the name's end (position_deg); options say what names do not.
+    A run of dcmp-hil goes through its observer and controller again, with other gains if you name some.
     """
-    from dcmp_hil.cli.replaying import Outputs, execute
-    from dcmp_hil.replay import ColumnOptions, ReplaySettings
+    from dcmp_hil.cli import replaying
+    from dcmp_hil.cli.replay_options import Given
 
+    given = Given(
+        columns={
+            "time": time,
+            "position": position,
+            "torque": torque,
+            "voltage": voltage,
+            "velocity": velocity,
+            "time_unit": time_unit,
+            "position_unit": position_unit,
+            "torque_unit": torque_unit,
+            "voltage_unit": voltage_unit,
+            "velocity_unit": velocity_unit,
+        },
+        file={"period": period, "no_input": no_input or None, "modulus": modulus, "input_at": input_at},
+        gains={"observer": observer, "f0": f0, "ku": ku, "mu0": mu0, "M": M, "L1": L1, "L2": L2},
+        encoder={"rig": rig, "inertia": inertia, "counts_per_rev": counts_per_rev},
+        figures={"start": window_from, "cutoff": cutoff},
+        overrides=tuple(overrides or ()),
+    )
+    outputs = replaying.Outputs(json=json_file, csv=csv, rrd=rrd, by_default=not no_write)
     if file.suffix == ".mcap" or file.is_dir():
         from dcmp_hil.cli.own_recording import replay_own
 
-        replay_own(file, overrides or (), json_file)
-        return
-    if overrides:
-        raise ConfigError(
-            "--set is for recordings of dcmp-hil itself (run.mcap); here say --mu0, --f0 and so on."
-        )
-    counts = _counts(counts_per_rev)
-    settings = ReplaySettings(
-        observer=observer if ":" in observer else observer.lower().replace("-", "_"),
-        f0=f0,
-        inertia=inertia,
-        ku=ku,
-        input_at=input_at.value,
-        counts_per_rev=counts,
-        period=period,
-        L1=L1,
-        L2=L2,
-        M=M,
-        mu0=mu0,
-        start=window_from,
-        cutoff=cutoff,
-    )
-    columns = ColumnOptions(
-        time=time,
-        position=position,
-        torque=torque,
-        voltage=voltage,
-        velocity=velocity,
-        time_unit=time_unit,
-        position_unit=position_unit,
-        torque_unit=torque_unit,
-        voltage_unit=voltage_unit,
-        velocity_unit=velocity_unit,
-        prefer="torque" if inertia is not None else "voltage" if ku is not None else None,
-        counts_per_rev=None if counts == "ideal" else counts,
-    )
-    execute(file, columns, settings, Outputs(json=json_file, csv=csv, rrd=rrd, by_default=not no_write))
-
-
-def _counts(text: str | None) -> float | Literal["ideal"] | None:
-    if text is None:
-        return None
-    if text.lower() == "ideal":
-        return "ideal"
-    try:
-        return float(text)
-    except ValueError:
-        raise ConfigError(
-            f'--counts-per-rev: got "{text}". Write the counts after quadrature, such as 4096, or ideal.'
-        ) from None
+        replay_own(file, given, outputs)
+    else:
+        replaying.execute(file, given.column_options(), given.settings(), outputs)

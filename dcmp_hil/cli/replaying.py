@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.table import Table
 
@@ -50,7 +50,7 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
         [
             (csv, lambda path: write_csv(result, path)),
             (rrd, lambda path: write_rrd(result, path)),
-            (json, lambda path: console.write_json(str(path), result.figures.to_dict())),
+            (json, lambda path: console.write_json(str(path), _figures(result))),
         ]
     )
     _show(file, settings, result, outputs)
@@ -67,9 +67,15 @@ def _show(file: Path, settings: ReplaySettings, result: ReplayResult, outputs: O
     for sentence in result.notes:
         console.note(sentence)
     if outputs.json == "-":
-        console.write_json("-", result.figures.to_dict())
+        console.write_json("-", _figures(result))
     else:
         console.out.print(_table(file, settings, result))
+
+
+def _figures(result: ReplayResult) -> dict[str, Any]:
+    """Return what `--json` writes: the figures, what was read from where, and the notes."""
+    columns = [str(column) for column in result.recording.columns]
+    return {**result.figures.to_dict(), "columns": columns, "notes": list(result.notes)}
 
 
 def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
@@ -112,7 +118,8 @@ def _table(file: Path, settings: ReplaySettings, result: ReplayResult) -> Table:
         ("disturbance error, RMS", _number(figures.disturbance_error_rms_rad_s2), f"rad/s², {against}"),
         ("disturbance with -sin(position)", _number(figures.disturbance_sin_correlation), "correlation"),
         ("rows, judged", f"{figures.rows}, {figures.rows_judged}", f"in {figures.duration_s:.4g} s"),
-        ("lost samples, restarts", gaps, "gaps above 10 periods"),
+        ("rows left out", f"{figures.rows_left_out}", "the notes say why"),
+        ("lost samples, restarts", gaps, "gaps above 10 periods, clock set back"),
         ("period, median / max", periods, "ms"),
         ("counts per revolution", counts, ""),
         ("mu0", _number(figures.mu0_rad_s), "rad/s"),

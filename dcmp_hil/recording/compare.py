@@ -41,30 +41,41 @@ class Comparison(NamedTuple):
     figures: tuple[Line, ...]
 
 
-def compare(recorded: RecordedRun, again: Again) -> Comparison:
-    """Compare what observer and controller said then and now."""
+def compare(recorded: RecordedRun, again: Again, start: float = 0.0) -> Comparison:
+    """Compare what observer and controller said then and now.
+
+    Parameters
+    ----------
+    recorded, again
+        The run, and what was made of it.
+    start
+        s from the first period: the figures count what is not earlier. `identical` counts every period.
+    """
     block = recorded.block
     names = ("position", "velocity", "disturbance")
     then = np.stack([block[f"{name}_estimate"] for name in names], axis=1)
     demand = block["voltage_demand"]
     same = _bits(then) == _bits(again.estimate) and _bits(demand) == _bits(again.demand)
-    true = {name: block[f"{name}_true"] for name in names}
-    duration = float(block["t"][-1] - block["t"][0]) if len(block) > 1 else 0.0
+    late = block["t"] - block["t"][0] >= start if len(block) else np.zeros(0, dtype=bool)
+    then, demand, now, asked = then[late], demand[late], again.estimate[late], again.demand[late]
+    true = {name: block[f"{name}_true"][late] for name in names}
+    t = block["t"][late]
+    duration = float(t[-1] - t[0]) if len(t) > 1 else 0.0
     figures = [
         *(
             Line(
                 f"{name}_error_rms_{unit}",
                 _rms(then[:, k] - true[name]),
-                _rms(again.estimate[:, k] - true[name]),
+                _rms(now[:, k] - true[name]),
             )
             for k, (name, unit) in enumerate(zip(names, ("rad", "rad_s", "rad_s2"), strict=True))
         ),
-        Line("demand_tv_V_s", _variation(demand, duration), _variation(again.demand, duration)),
-        Line("velocity_difference_max_rad_s", None, _largest(again.estimate[:, 1] - then[:, 1])),
-        Line("disturbance_difference_max_rad_s2", None, _largest(again.estimate[:, 2] - then[:, 2])),
-        Line("demand_difference_max_V", None, _largest(again.demand - demand)),
+        Line("demand_tv_V_s", _variation(demand, duration), _variation(asked, duration)),
+        Line("velocity_difference_max_rad_s", None, _largest(now[:, 1] - then[:, 1])),
+        Line("disturbance_difference_max_rad_s2", None, _largest(now[:, 2] - then[:, 2])),
+        Line("demand_difference_max_V", None, _largest(asked - demand)),
     ]
-    return Comparison(same, len(block), tuple(figures))
+    return Comparison(same, len(t), tuple(figures))
 
 
 def _bits(values: Column) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dcmp_hil.recording.again import Again
     from dcmp_hil.recording.reader import RecordedRun
 
 _ROWS = 4096  # a block of a Rerun recording
+_TWICE = (  # what a replay says a second time
+    "position_estimate_rad",
+    "velocity_estimate_rad_s",
+    "disturbance_estimate_rad_s2",
+    "voltage_demand_V",
+)
 
 
 def to_csv(run: RecordedRun, path: Path) -> None:
@@ -49,6 +60,32 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
     for first in range(0, len(run.rows), _ROWS):
         sink.block(Block(run.rows[first : first + _ROWS], run.rig.model.values()))
     sink.close()
+
+
+def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
+    """Write what observer and controller said then and now, one row a period."""
+    table = {name: run.columns[name] for name in ("time_s", *_TWICE)} | {
+        f"{name}_again": values for name, values in _now(again).items()
+    }
+    with _writing(path), path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        for row in zip(*(column.tolist() for column in table.values()), strict=True):
+            writer.writerow("" if math.isnan(value) else repr(value) for value in row)
+
+
+def again_to_rrd(run: RecordedRun, again: Again, path: Path) -> None:
+    """Write what observer and controller said then and now as a Rerun recording, one plot a signal."""
+    from dcmp_hil.telemetry.series import write_series
+
+    plots = {name: {"recorded": run.columns[name], "again": values} for name, values in _now(again).items()}
+    time = run.columns["time_s"]
+    with _writing(path):
+        write_series(path, "dcmp-hil replay", time - time[0], plots)
+
+
+def _now(again: Again) -> dict[str, NDArray[np.float64]]:
+    return dict(zip(_TWICE, (*again.estimate.T, again.demand), strict=True))
 
 
 @contextmanager

@@ -7,7 +7,8 @@ result.figures.velocity_error_rms_rad_s
 
 from dcmp_hil.replay.export import columns, write_csv, write_rrd
 from dcmp_hil.replay.figures import Estimates, Figures
-from dcmp_hil.replay.recording import ColumnOptions, Recording, read_recording
+from dcmp_hil.replay.reading import read_recording
+from dcmp_hil.replay.recording import ColumnOptions, Recording
 from dcmp_hil.replay.reference import ZeroPhase, zero_phase
 from dcmp_hil.replay.resolution import estimate_counts_per_rev
 from dcmp_hil.replay.run import ReplayResult, replay

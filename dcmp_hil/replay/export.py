@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.replay.run import ReplayResult
 
-_INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V"}
+_INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V", "none": "voltage_V"}
 _APPLICATION = "dcmp-hil replay"
 
 

@@ -50,8 +50,10 @@ class Figures:
     lost_samples: int
     """Sum of round(dt / T) - 1."""
     restarts: int
-    """Gaps of more than ten periods, after each of which the observer began anew."""
+    """Gaps of more than ten periods and other breaks, after each of which the observer began anew."""
     rows: int
+    rows_left_out: int
+    """Of the file: without a number that is needed, there twice, or where no arm can have been."""
     rows_judged: int
     duration_s: float
     period_median_s: float
@@ -70,24 +72,26 @@ class Figures:
         return asdict(self)
 
 
-def sampling(time: NDArray[np.float64], period: float, gap: float) -> dict[str, Any]:
+def sampling(recording: Recording, period: float, begins: NDArray[np.bool_]) -> dict[str, Any]:
     """Describe the sampling: the part of `Figures` that needs no observer.
 
     Parameters
     ----------
-    time
-        s, shape (n,), rising.
+    recording
+        Its time counts.
     period
         s, the nominal T.
-    gap
-        s: the observer restarts after a longer step.
+    begins
+        Shape (n,): where the observer begins anew.
     """
+    time = recording.time
     steps = np.diff(time)
     return {
         # Summed before it is cut at 0: a late sample makes one long step and one short one, and none is lost.
         "lost_samples": max(0, int(np.sum(np.round(steps / period) - 1.0))),
-        "restarts": int(np.count_nonzero(steps > gap)),
+        "restarts": int(np.count_nonzero(begins[1:])),
         "rows": len(time),
+        "rows_left_out": recording.left_out,
         "duration_s": float(time[-1] - time[0]),
         "period_median_s": float(np.median(steps)),
         "period_max_s": float(np.max(steps)),
@@ -109,6 +113,9 @@ def judge(
     """
     error = (estimates.velocity - reference.velocity)[judged]
     given = None if recording.velocity is None else (recording.velocity - reference.velocity)[judged]
+    if given is not None:
+        given = given[np.isfinite(given)]
+        given = given if len(given) else None
     w = estimates.disturbance[judged]
     window = recording.time[judged][[0, -1]] - recording.time[0]
     return {

@@ -14,14 +14,40 @@ if TYPE_CHECKING:
 
     from dcmp_hil.replay.units import Quantity
 
-# Words that a quantity goes by, the likeliest first.
+# Words that a quantity goes by, the likeliest first; German ones, too, since Excel and LabVIEW write them.
 _NAMES: dict[Quantity, tuple[str, ...]] = {
-    "time": ("time", "t", "timestamp", "stamp", "elapsed", "clock", "times", "timestamps"),
-    "position": ("position", "pos", "q", "angle", "theta", "phi", "x", "x1", "y", "joint", "encoder"),
-    "torque": ("torque", "tau", "trq", "u"),
-    "voltage": ("voltage", "volt", "volts", "u", "v"),
-    "velocity": ("velocity", "vel", "speed", "omega", "qd", "dq", "qdot", "thetadot", "x2", "v"),
+    "time": (
+        "time",
+        "t",
+        "timestamp",
+        "stamp",
+        "elapsed",
+        "clock",
+        "times",
+        "timestamps",
+        "zeit",
+        "datetime",
+    ),
+    "position": (
+        *("position", "pos", "q", "angle", "theta", "phi", "x", "x1", "y", "joint", "encoder", "winkel"),
+        *("drehwinkel", "enc", "counts"),
+    ),
+    "torque": ("torque", "tau", "trq", "u", "effort", "drehmoment"),
+    "voltage": ("voltage", "volt", "volts", "u", "v", "spannung"),
+    "velocity": (
+        *("velocity", "vel", "speed", "omega", "qd", "dq", "qdot", "thetadot", "x2", "v"),
+        *("geschwindigkeit", "drehzahl"),
+    ),
 }
+# Whole names whose words alone would not tell.
+_WHOLE: dict[str, Quantity] = {
+    "x value": "time",
+    "x values": "time",
+    "date time": "time",
+    "counts": "position",
+}
+_WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
+_NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
 _UNSURE = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
 
@@ -34,9 +60,19 @@ def _words(text: str) -> frozenset[str]:
 _PLAIN = _words("""measured meas mes actual act real fb feedback applied given rel
     motor joint pendulum arm shaft output encoder angle angular""")
 _COMMAND = _words("command commanded cmd desired des demand demanded sent control ctrl")
+_DRIVE = _words("drive input amp amplifier")
 _OTHER = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered filt
     limit min max std constant offset index id acceleration accel acc current temperature temp
     bus supply battery dc""")
+
+
+_WHY = {
+    "option": "by option",
+    "name": "by its name",
+    "units": "by the file",
+    "values": "by its values",
+    "assumed": "assumed",
+}
 
 
 class Match(NamedTuple):
@@ -53,7 +89,7 @@ class Match(NamedTuple):
     size
         What one of that unit is in SI; NaN for counts.
     source
-        Who says so: ``option``, ``name`` or ``assumed``.
+        Who says so: ``option``, ``name``, ``units`` (a row of units, the cells), ``values``, ``assumed``.
     """
 
     quantity: Quantity
@@ -64,11 +100,17 @@ class Match(NamedTuple):
 
     def __str__(self) -> str:
         """Say it in a line."""
-        why = {"option": "by option", "name": "by its name", "assumed": "assumed"}[self.source]
+        why = _WHY[self.source]
         return f'{self.quantity}: column "{self.column}" in {self.unit} ({why})'
 
 
-def match(quantity: Quantity, header: Sequence[str], column: str | None, unit: str | None) -> Match | None:
+def match(
+    quantity: Quantity,
+    header: Sequence[str],
+    column: str | None,
+    unit: str | None,
+    units: Sequence[str] = (),
+) -> Match | None:
     """Find the column of a quantity.
 
     Parameters
@@ -80,7 +122,10 @@ def match(quantity: Quantity, header: Sequence[str], column: str | None, unit: s
     column
         The one that an option names; None looks for the likeliest.
     unit
-        The unit that an option names; None takes it from the column's name (``position_deg``), SI by default.
+        The unit that an option names; None takes it from the column's name (``position_deg``), then from
+        `units`, SI by default.
+    units
+        What the file says about each column's unit, or nothing.
 
     Returns
     -------
@@ -97,12 +142,41 @@ def match(quantity: Quantity, header: Sequence[str], column: str | None, unit: s
         return None
     if unit is not None:
         return Match(quantity, name, *known_unit(quantity, unit), "option")
-    _, found = _parts(quantity, name)
-    return (
-        Match(quantity, name, *found, "name")
-        if found
-        else Match(quantity, name, SI[quantity], 1.0, "assumed")
-    )
+    words, found = _parts(quantity, name)
+    if found is None and len(words) == 1 and (words[0] in _WHOLE or name.lower() == "counts"):
+        found = find_unit(quantity, words[0])
+    if found is not None:
+        return Match(quantity, name, *found, "name")
+    told = units[list(header).index(name)] if units else ""
+    if not told:
+        return Match(quantity, name, SI[quantity], 1.0, "assumed")
+    in_file = find_unit(quantity, told)
+    if in_file is None:
+        raise ConfigError(
+            f'{quantity}: the file says that column "{name}" is in "{told}", which is no unit of {quantity}. '
+            f"Say its unit: --{quantity}-unit, or another column: --{quantity}."
+        )
+    return Match(quantity, name, *in_file, "units")
+
+
+def sample_number(header: Sequence[str]) -> str | None:
+    """Return the column that numbers the samples, if one is called so."""
+    return next((name for name in header if " ".join(_parts("time", name)[0]) in _NUMBERS), None)
+
+
+def split_time(header: Sequence[str]) -> tuple[str, str] | None:
+    """Return the two columns of a time in whole seconds and their fraction, such as `secs` and `nsecs`."""
+    ends: dict[tuple[str, ...], dict[float, str]] = {}
+    for name in header:
+        words = re.findall(r"[a-z0-9]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower())
+        unit = find_unit("time", words[-1]) if words else None
+        if unit:
+            ends.setdefault(tuple(words[:-1]), {})[unit[1]] = name
+    for sizes in ends.values():
+        smaller = [name for size, name in sizes.items() if size < 1.0]
+        if 1.0 in sizes and len(smaller) == 1:
+            return sizes[1.0], smaller[0]
+    return None
 
 
 def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
@@ -130,7 +204,12 @@ def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
 def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
     """How likely it is, the smallest first; None for a column of something else."""
     words, unit = _parts(quantity, name)
+    if " ".join(words) in _WHOLE:
+        return (1, 99) if _WHOLE[" ".join(words)] == quantity else None
+    words = [_without_number(quantity, word) for word in words]
     names = [word for word in words if word in _NAMES[quantity] and (unit or word not in _UNSURE)]
+    if not names and unit and words and quantity != "time" and _PLAIN.union(_DRIVE).issuperset(words):
+        return (4, 0)  # such as motor_V
     rest = [word for word in words if word not in names[:1]]
     if not names or _OTHER.intersection(words) or any(_says_other(quantity, word) for word in rest):
         return None
@@ -141,6 +220,12 @@ def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
     if not rest:
         return (0, order)
     return (1 if _PLAIN.issuperset(rest) else 2, order)
+
+
+def _without_number(quantity: Quantity, word: str) -> str:
+    """Take the number of a joint off a word, as in `position0`."""
+    bare = word.rstrip("0123456789")
+    return bare if len(bare) > 2 and bare in _NAMES[quantity] else word  # noqa: PLR2004 - x1 is a name
 
 
 def _says_other(quantity: Quantity, word: str) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -66,7 +65,7 @@ def prepare(recording: Recording, settings: ReplaySettings) -> Preparation:
     period = _period(recording, settings)
     counts, how = _resolution(recording, settings)
     notes = why + how
-    setting = ObserverContext(Model(f0=settings.f0, ku=ku), period, counts)
+    setting = ObserverContext(settings.model._replace(f0=settings.friction, ku=ku), period, counts)
     observer = _make(settings, setting)
     if isinstance(observer, SuperTwisting) and observer.mu0 * period > 0.3 + 1e-9:
         most = 0.3 / period
@@ -77,8 +76,12 @@ def prepare(recording: Recording, settings: ReplaySettings) -> Preparation:
 
 def _gains(recording: Recording, settings: ReplaySettings) -> tuple[float, float, tuple[str, ...]]:
     """Return the model's ku, what the input is multiplied by to be the voltage of a sample, and notes."""
+    if recording.input_kind == "none":
+        return settings.model.ku if settings.ku is None else settings.ku, 1.0, ()
     if recording.input_kind == "voltage" and settings.ku is None:
-        ku = Model().ku
+        ku = settings.model.ku
+        if ku != Model().ku:
+            return ku, 1.0, ()
         return ku, 1.0, (f"ku = {ku:g} (rad/s2)/V is the paper's motor. --ku says what yours is.",)
     if recording.input_kind == "voltage" and settings.ku is not None:
         return settings.ku, 1.0, ()
@@ -124,10 +127,11 @@ def _make(settings: ReplaySettings, setting: ObserverContext) -> Observer:
         return SuperTwisting(setting, L1=settings.L1, L2=settings.L2, M=settings.M, mu0=settings.mu0)
     if settings.observer == "paper":
         M = _PAPER_M if settings.M is None else settings.M
-        return PaperObserver(setting, L1=settings.L1, L2=settings.L2, M=M)
-    find = find_named(settings.observer, "--observer", ("super_twisting", "paper"), (Path(),))
-    role = OBSERVER._replace(key="--observer", call="Class(context)")
-    return CheckedObserver(make(find, settings.observer, role, (setting,), {}), settings.observer)
+        return PaperObserver(setting, L1=settings.L1, L2=settings.L2, M=M, from_zero=settings.from_zero)
+    find = find_named(settings.observer, "--observer", ("super_twisting", "paper"), settings.folders)
+    role = OBSERVER._replace(key="--observer")
+    made = make(find, settings.observer, role, (setting,), settings.observer_options)
+    return CheckedObserver(made, settings.observer)
 
 
 def _over_the_step_before(values: NDArray[np.float64], settings: ReplaySettings) -> NDArray[np.float64]:

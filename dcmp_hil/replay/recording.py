@@ -1,4 +1,4 @@
-"""A recording in SI units, read from a CSV file whose columns and units are found or told."""
+"""A recording in SI units."""
 
 from __future__ import annotations
 
@@ -7,50 +7,50 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.csv_file import pick_columns, read_text
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.names import match
-from dcmp_hil.replay.units import COUNTS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
-    from dcmp_hil.csv_file import Text
     from dcmp_hil.replay.names import Match
     from dcmp_hil.replay.settings import InputKind
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.replay.turns import Modulus
 
 _FEWEST_ROWS = 20
 _LARGEST = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong
-_TURN = 2.0 * np.pi
-_NEARLY = 0.1  # turns
 
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnOptions:
-    """Names and units of the columns; None finds the name, and takes the unit from the name or SI.
+    """Names and units of the columns; None finds the name, and takes the unit from the name, the file or SI.
 
     A unit is spelled as usual: ``s ms us ns``, ``rad mrad deg rev counts``, ``N m``, ``mN m``, ``V mV``,
-    ``rad/s deg/s rpm``.
+    ``rad/s deg/s rpm``. The columns of a file without names are called 1, 2, 3.
     """
 
     time: str | None = None
+    """`none` where the file has no time worth taking; `a+b` for whole seconds and their fraction."""
     position: str | None = None
     torque: str | None = None
+    """`none`, like that of `voltage`, is the same as `no_input`."""
     voltage: str | None = None
     velocity: str | None = None
+    """`none` leaves a velocity that the file has out."""
     time_unit: str | None = None
     position_unit: str | None = None
     torque_unit: str | None = None
     voltage_unit: str | None = None
     velocity_unit: str | None = None
+    no_input: bool = False
+    """Nothing was applied: the arm swung freely."""
     prefer: InputKind | None = None
     """Which input to take where the file has both and no option names one."""
     counts_per_rev: float | None = None
     """What a position in counts is converted by."""
+    period: float | None = None
+    """s: the rows are evenly sampled; a time column then tells only which of them were lost."""
+    modulus: Modulus = None
+    """At how many of its own units the position wraps; `none`: nowhere; None finds it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +66,15 @@ class Recording:
     position
         rad, shape (n,), unwrapped; 0 = hanging at rest.
     input
-        N m or V, shape (n,): as written in each row.
+        N m or V, shape (n,): as written in each row; 0 where nothing was applied.
     input_kind
-        Which of the two it is.
+        Which of the two it is, or `none`.
     velocity
-        rad/s, shape (n,), of the device itself; None where the file has none.
+        rad/s, shape (n,), of the device itself, NaN where it is not known; None where the file has none.
+    breaks
+        Rows at which a new stretch begins that nothing ties to the one before.
+    left_out
+        Rows of the file that are not in these columns.
     columns
         What was read from where, in which unit.
     notes
@@ -83,6 +87,8 @@ class Recording:
     input: NDArray[np.float64]
     input_kind: InputKind
     velocity: NDArray[np.float64] | None = None
+    breaks: tuple[int, ...] = ()
+    left_out: int = 0
     columns: tuple[Match, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -111,10 +117,25 @@ class Recording:
         stuck = np.flatnonzero(np.diff(self.time) <= 0.0)
         if len(stuck):
             raise ConfigError(
-                f"{self.name}, row {stuck[0] + 2}: time does not rise. Sort the rows or remove repeated ones."
+                f"{self.name}, row {stuck[0] + 2}: time does not rise from row to row. If the rows are "
+                "evenly sampled, give them the times that they were taken at (read_recording does: --period)."
             )
 
+    def begins(self, gap: float) -> NDArray[np.bool_]:
+        """Return where a stretch begins, shape (n,): at the first row, a break, and behind a longer step.
+
+        Parameters
+        ----------
+        gap
+            s: a longer step is not bridged.
+        """
+        begins = np.concatenate(([True], np.diff(self.time) > gap))
+        begins[list(self.breaks)] = True
+        return begins
+
     def _unbelievable(self, name: str, values: NDArray[np.float64]) -> str:
+        if name == "velocity":  # nothing depends on it
+            values = np.nan_to_num(values)
         limit = np.inf if name == "time" else _LARGEST
         bad = np.flatnonzero(~(np.isfinite(values) & (np.abs(values) <= limit)))
         if not len(bad):
@@ -124,113 +145,3 @@ class Recording:
             f"{self.name}, row {row + 1}: a {name} of {values[row]:g} (SI) is no measurement. "
             f"Check the column and its unit (--{name}, --{name}-unit)."
         )
-
-
-def read_recording(path: Path, options: ColumnOptions | None = None) -> Recording:
-    """Read a CSV recording with columns of time, position and torque or voltage, perhaps velocity.
-
-    Positions that jump by a whole turn between two rows are unwrapped.
-
-    Parameters
-    ----------
-    path
-        The file, with a header line; see `dcmp_hil.csv_file.read_columns`.
-    options
-        Names and units, as far as the names in the file do not tell.
-
-    Raises
-    ------
-    ConfigError
-        If the file is missing or malformed, a value is no finite number, time does not rise, a column cannot
-        be found, or a unit is unknown.
-    """
-    options = options or ColumnOptions()
-    text = read_text(path)
-    time = _required("time", text, options)
-    position = _required("position", text, options)
-    torque_or_voltage = _input(text, options)
-    velocity = match("velocity", text.header, options.velocity, options.velocity_unit)
-    found = [column for column in (time, position, torque_or_voltage, velocity) if column]
-    names = [column.column for column in found]
-    if len(set(names)) < len(names):
-        raise ConfigError(
-            f"{path}: one column is used twice ({', '.join(names)}). Give each quantity its own."
-        )
-    values = pick_columns(text, names, time=time.column)
-    si = {column.quantity: values[column.column] * _size(column, options) for column in found}
-    unwrapped, turns = _unwrap(si["position"])
-    return Recording(
-        name=path.stem,
-        time=si["time"],
-        position=unwrapped,
-        input=si[torque_or_voltage.quantity],
-        input_kind="torque" if torque_or_voltage.quantity == "torque" else "voltage",
-        velocity=si.get("velocity"),
-        columns=tuple(found),
-        notes=tuple(_notes(torque_or_voltage, turns)),
-    )
-
-
-def _required(quantity: Quantity, text: Text, options: ColumnOptions) -> Match:
-    found = _find(quantity, text.header, options)
-    if found is None:
-        raise ConfigError(
-            f"{text.path}: no column looks like {quantity}; the header has: {', '.join(text.header)}. "
-            f"Name it: --{quantity} COLUMN (and its unit, if it is not SI: --{quantity}-unit)."
-        )
-    return found
-
-
-def _input(text: Text, options: ColumnOptions) -> Match:
-    if options.torque is not None and options.voltage is not None:
-        raise ConfigError("--torque and --voltage: a replay takes one input. Leave one of them out.")
-    torque = _find("torque", text.header, options) if options.voltage is None else None
-    voltage = _find("voltage", text.header, options) if options.torque is None else None
-    if torque and voltage and options.prefer:
-        torque, voltage = (torque, None) if options.prefer == "torque" else (None, voltage)
-    if torque and voltage:
-        raise ConfigError(
-            f'{text.path} has a torque ("{torque.column}") and a voltage ("{voltage.column}"). '
-            f'Say which one is the input: --torque "{torque.column}" or --voltage "{voltage.column}".'
-        )
-    found = torque or voltage
-    if found is None:
-        raise ConfigError(
-            f"{text.path}: no column looks like torque or voltage; the header has: {', '.join(text.header)}. "
-            "Name it: --torque COLUMN or --voltage COLUMN."
-        )
-    return found
-
-
-def _find(quantity: Quantity, header: Sequence[str], options: ColumnOptions) -> Match | None:
-    return match(quantity, header, getattr(options, quantity), getattr(options, f"{quantity}_unit"))
-
-
-def _size(column: Match, options: ColumnOptions) -> float:
-    if column.unit != COUNTS:
-        return column.size
-    if options.counts_per_rev is None:
-        raise ConfigError(
-            f'The position "{column.column}" is in counts. Say how many make a turn: --counts-per-rev N.'
-        )
-    return _TURN / options.counts_per_rev
-
-
-def _unwrap(position: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """Undo jumps of a turn, and count them: no arm makes nine tenths of a turn between two rows."""
-    jumps = np.diff(position) / _TURN
-    turns = np.where(np.abs(np.abs(jumps) - 1.0) < _NEARLY, np.sign(jumps), 0.0)
-    places = int(np.count_nonzero(turns))
-    return (position - _TURN * np.concatenate(([0.0], np.cumsum(turns))) if places else position), places
-
-
-def _notes(column: Match, turns: int) -> list[str]:
-    notes = []
-    if turns:
-        notes.append(f"The position jumps by a turn in {turns} places: unwrapped.")
-    if "applied" in column.column.lower():
-        notes.append(
-            f'"{column.column}" sounds like the input of the period that ended, as dcmp-hil records it: '
-            "that is --input-at end."
-        )
-    return notes

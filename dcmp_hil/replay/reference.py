@@ -40,15 +40,14 @@ def zero_phase(
     *,
     period: float,
     f0: float,
-    longest_gap: float,
+    begins: NDArray[np.bool_],
     cutoff: float = 15.0,
 ) -> ZeroPhase:
     """Filter forwards and backwards, then take central differences.
 
     The filter (third-order Butterworth) needs even sampling: the rows are interpolated linearly onto an even
     grid of nearly one period, filtered and differentiated there, and read back at their own instants. That
-    bridges lost samples. A gap longer than `longest_gap` is not bridged: what lies before and after it is
-    filtered on its own.
+    bridges lost samples. Every stretch of `begins` is filtered on its own.
 
     The ends are continued by odd reflection over two periods of the corner: with scipy's own 12 samples the
     velocity at an end in motion is 14 % off at 333 Hz, and more at higher rates.
@@ -63,8 +62,8 @@ def zero_phase(
         s, the usual step.
     f0
         1/s, viscous friction.
-    longest_gap
-        s.
+    begins
+        Shape (n,): the rows at which a stretch begins; the first one does.
     cutoff
         Hz, of the Butterworth filter.
 
@@ -79,8 +78,7 @@ def zero_phase(
             f"Hz, which needs {cutoff / _FASTEST:.3g} Hz. Check --time-unit, or lower --cutoff."
         )
     velocity, disturbance = np.full(len(time), np.nan), np.full(len(time), np.nan)
-    breaks = np.flatnonzero(np.diff(time) > longest_gap) + 1
-    for first, last in pairwise([0, *breaks.tolist(), len(time)]):
+    for first, last in pairwise([*np.flatnonzero(begins).tolist(), len(time)]):
         rows = slice(first, last)
         # Around a row, u is the mean of the steps on either side of it.
         around = 0.5 * (applied[rows] + np.append(applied[first + 1 : last], applied[last - 1]))

@@ -10,6 +10,7 @@ import numpy as np
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
+from dcmp_hil.replay.plausibility import check_estimates, check_motion
 from dcmp_hil.replay.preparation import prepare
 from dcmp_hil.replay.reference import ZeroPhase, zero_phase
 from dcmp_hil.replay.settings import ReplaySettings
@@ -79,16 +80,17 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
     settings = settings or ReplaySettings()
     set_up = prepare(recording, settings)
     period, gap = set_up.setting.period, _LONGEST_GAP * set_up.setting.period
+    begins = recording.begins(gap)
     reference = zero_phase(
         recording.time,
         recording.position,
         set_up.setting.model.ku * set_up.voltage,
         period=period,
-        f0=settings.f0,
-        longest_gap=gap,
+        f0=settings.friction,
+        begins=begins,
         cutoff=settings.cutoff,
     )
-    settled = _since_restart(recording.time, gap) > settings.start + _ROUNDING
+    settled = _since_restart(recording.time, begins) > settings.start + _ROUNDING
     judged = settled & np.isfinite(reference.velocity)
     if not judged.any():
         raise ConfigError(
@@ -96,7 +98,9 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
             f"after every gap of more than {gap:g} s. "
             "Check --time-unit, record longer, or write a smaller --from."
         )
-    estimates = _run(set_up.observer, recording, set_up.voltage)
+    check_motion(recording, reference, judged)
+    estimates = _run(set_up.observer, recording, set_up.voltage, gap)
+    check_estimates(recording, estimates, reference, judged)
     return ReplayResult(
         recording=recording,
         applied=set_up.applied,
@@ -104,7 +108,7 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
         reference=reference,
         judged=judged,
         figures=Figures(
-            **sampling(recording.time, period, gap),
+            **sampling(recording, period, begins),
             **judge(recording, estimates, reference, judged),
             counts_per_rev=set_up.setting.counts_per_rev,
             mu0_rad_s=set_up.observer.mu0 if isinstance(set_up.observer, SuperTwisting) else None,
@@ -113,15 +117,19 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
     )
 
 
-def _since_restart(time: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+def _since_restart(time: NDArray[np.float64], begins: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return how long the observer has been running at each row, s."""
-    begins = np.concatenate(([True], np.diff(time) > gap))
     return time - time[np.maximum.accumulate(np.where(begins, np.arange(len(time)), 0))]
 
 
-def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64]) -> Estimates:
-    """Run the line without a loop: one sample a row, its time counted from the first row."""
+def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64], gap: float) -> Estimates:
+    """Run the line without a loop: one sample a row, its time counted from the first row.
+
+    At a break the observer is shown a gap, so that it begins anew as it does after a real one.
+    """
     elapsed = recording.time - recording.time[0]
+    for row in recording.breaks:
+        elapsed[row:] += 2.0 * gap
     rows = np.empty((len(elapsed), len(Estimate._fields)))
     samples = zip(elapsed.tolist(), recording.position.tolist(), voltage.tolist(), strict=True)
     for k, (t, position, applied) in enumerate(samples):

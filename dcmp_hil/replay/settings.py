@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.model import Model
 
-InputKind = Literal["torque", "voltage"]
+InputKind = Literal["torque", "voltage", "none"]
+_PAPER = Model()
+_HERE = Path()
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
 
@@ -24,9 +28,17 @@ class ReplaySettings:
     """
 
     observer: str = "super_twisting"
-    """`super_twisting` (R1), `paper` (R0), or `module:Class` of your own, made as Class(context)."""
-    f0: float = 0.1
-    """Viscous friction over inertia fd/J, 1/s."""
+    """`super_twisting` (R1), `paper` (R0), or `module:Class`, made as Class(context, **observer_options)."""
+    observer_options: dict[str, Any] = field(default_factory=dict)
+    """What `module:Class` is made with, by keyword."""
+    folders: tuple[Path, ...] = (_HERE,)
+    """Where its module is looked for beside what is installed."""
+    from_zero: bool = False
+    """Whether the paper's observer begins at 0, as in the paper, and not at the first position."""
+    model: Model = _PAPER
+    """What an observer of your own is told of the plant; `f0` and `ku` below come first."""
+    f0: float | None = None
+    """Viscous friction over inertia fd/J, 1/s; None: that of `model`, the paper's 0.1."""
     inertia: float | None = None
     """J, kg m2: turns a torque into the input u = torque / J. Required with a torque."""
     ku: float | None = None
@@ -61,8 +73,15 @@ class ReplaySettings:
             faults.append(f'--input-at: got "{self.input_at}". Write start (row k-1) or end (row k).')
         if self.mu0 is not None and self.observer == "paper":
             faults.append("--mu0: the paper's observer has no bandwidth floor. Leave the option out.")
+        if self.observer_options and ":" not in self.observer:
+            faults.append("observer.options: only an observer of your own (module:Class) takes them.")
         if faults:
             raise ConfigError(*faults)
+
+    @property
+    def friction(self) -> float:
+        """Return f0, 1/s."""
+        return self.model.f0 if self.f0 is None else self.f0
 
     def _ranges(self) -> list[tuple[str, float, str, float, float, bool, str]]:
         """Of those that are set: option, value, unit, least, most, whether the least is out, remedy."""

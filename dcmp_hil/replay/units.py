@@ -18,10 +18,11 @@ _DEG, _REV = math.pi / 180.0, 2.0 * math.pi
 # The first spelling of each is the one that messages use; all are compared without case and punctuation.
 _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
     "time": {
-        1.0: ("s", "sec", "secs", "second", "seconds"),
-        1e-3: ("ms", "msec", "millis", "millisecond", "milliseconds"),
-        1e-6: ("us", "µs", "usec", "micros", "microsecond", "microseconds"),
-        1e-9: ("ns", "nsec", "nanos", "nanosecond", "nanoseconds"),
+        1.0: ("s", "sec", "secs", "second", "seconds", "sekunden"),
+        1e-3: ("ms", "msec", "msecs", "millis", "millisecond", "milliseconds"),
+        1e-6: ("us", "µs", "usec", "usecs", "micros", "microsecond", "microseconds"),
+        1e-9: ("ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"),
+        60.0: ("min", "minute", "minutes"),
     },
     "position": {
         1.0: ("rad", "rads", "radian", "radians"),
@@ -78,6 +79,12 @@ def find_unit(quantity: Quantity, spelling: str) -> tuple[str, float] | None:
         The usual spelling, and what one of them is in SI (NaN for counts); None for an unknown one.
     """
     return _UNITS[quantity].get(bare(spelling))
+
+
+def any_unit(spelling: str) -> bool:
+    """Whether a spelling is a unit of any quantity."""
+    plain = bare(spelling)
+    return bool(plain) and any(plain in units for units in _UNITS.values())
 
 
 def known_unit(quantity: Quantity, spelling: str) -> tuple[str, float]:

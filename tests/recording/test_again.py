@@ -166,11 +166,74 @@ def test_a_recording_that_was_cut_off_is_replayed_and_said_to_be(tmp_path: Path,
     assert "to the bit" in outcome.out.replace("\n", " ")
 
 
-def test_set_is_for_recordings_of_our_own(tmp_path: Path, cli: Cli) -> None:
-    (tmp_path / "other.csv").write_text("time_s,position_rad,voltage_V\n0,0,0\n1,1,1\n")
-    outcome = cli("replay", str(tmp_path / "other.csv"), "--set", "observer.mu0_rad_s=5")
+GAINS = {
+    ("--observer", "paper"): "observer.kind=paper",
+    ("--observer", "Super-Twisting"): "observer.kind=super_twisting",
+    ("--mu0", "70"): "observer.mu0_rad_s=70.0",
+    ("--M", "40"): "observer.M_rad_s3=40.0",
+    ("--L1", "6"): "observer.L1_1_s=6.0",
+    ("--L2", "8"): "observer.L2_1_s2=8.0",
+    ("--f0", "0.5"): "model.f0_1_s=0.5",
+    ("--ku", "4"): "model.ku_rad_s2_V=4.0",
+}
+
+
+def test_every_gain_is_honoured_under_its_short_name(tmp_path: Path, cli: Cli) -> None:
+    folder = str(record(tmp_path, duration=1.0))
+
+    def figures(*options: str) -> dict[str, Any]:
+        outcome = cli("replay", folder, *options, "--json", "-")
+        assert (outcome.code, outcome.err) == (0, "")
+        got: dict[str, Any] = json.loads(outcome.out)
+        return got
+
+    usual = figures()
+    for short, key in GAINS.items():
+        assert figures(*short) == figures("--set", key)
+        assert figures(*short)["identical"] == (short[1] == "Super-Twisting")
+        assert (figures(*short) == usual) == (short[1] == "Super-Twisting")
+
+
+def test_window_and_files_of_a_run_are_honoured(tmp_path: Path, cli: Cli) -> None:
+    folder = str(record(tmp_path, duration=2.0))
+    csv_file, rrd = tmp_path / "o.csv", tmp_path / "o.rrd"
+    outcome = cli(
+        *("replay", folder, "--mu0", "70", "--from", "1.5", "--json", "-", "--csv", str(csv_file)),
+        *("--rrd", str(rrd), "--no-write"),
+    )
+    figures = json.loads(outcome.out)
+    assert (figures["rows"], figures["identical"]) == (500, False)
+    with csv_file.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2000
+    now, then = (
+        np.array([float(row[f"velocity_estimate_rad_s{end}"]) for row in rows]) for end in ("_again", "")
+    )
+    assert np.max(np.abs(now - then)[1500:]) == figures["velocity_difference_max_rad_s"]["again"]
+    assert np.array_equal(values(rrd, "velocity_estimate_rad_s")[:, 1], now)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(("--time", "t"), ("--position", "q"), ("--voltage", "none"), ("--velocity-unit", "rpm")),
+        *(("--period", "0.002"), ("--no-input",), ("--modulus", "65536"), ("--input-at", "end")),
+        *(("--rig", "paper"), ("--inertia", "0.1"), ("--counts-per-rev", "2000"), ("--cutoff", "15")),
+    ],
+)
+def test_an_option_that_means_nothing_for_a_run_is_refused(
+    option: tuple[str, ...], tmp_path: Path, cli: Cli
+) -> None:
+    outcome = cli("replay", str(tmp_path), *option)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert f"{option[0]}: for a CSV file only" in outcome.err
+
+
+def test_one_key_given_twice_is_refused(tmp_path: Path, cli: Cli) -> None:
+    folder = str(record(tmp_path, duration=0.5))
+    outcome = cli("replay", folder, "--mu0", "70", "--set", "observer.mu0_rad_s=60")
     assert outcome.code == 2
-    assert "run.mcap" in outcome.err
+    assert "--mu0 and --set observer.mu0_rad_s say the same" in outcome.err
 
 
 def test_exports_are_the_recording(tmp_path: Path, cli: Cli) -> None:

@@ -1,0 +1,183 @@
+"""Evenly sampled rows behind stamps that are too coarse to tell, or that came late."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Column = NDArray[np.float64]
+
+_FEW = 0.05  # share of the rows whose stamp may repeat the one before in a clock that is fine otherwise
+_FINE = 0.05  # of a step: stamps of that resolution are taken as they are
+_WINDOW = 64  # rows that a period is averaged over
+_SHORT_WINDOW = 10
+_FEWEST = 8  # rows that tell a period
+_AGREES = 0.02  # between a period that is told and the one that the stamps show
+_LOSS = 0.75  # of a period, by which the stamps move on where a row was lost
+_KINDS = 6  # of steps that a coarse clock shows
+_ROUNDING = 1e-6  # s
+
+
+class _Grid(NamedTuple):
+    number: NDArray[np.float64]  # of each row's instant, shape (n,)
+    period: float  # s
+    spread: float  # s, between the largest and the smallest deviation of a stamp
+
+
+def even_rows(time: Column, period: float | None, name: str, notes: list[str]) -> Column:
+    """Return the instants of rows, s, shape (n,), rising.
+
+    Parameters
+    ----------
+    time
+        s, shape (n,): the stamps, none earlier than the one before.
+    period
+        s, of evenly sampled rows: then the stamps tell only which rows were lost. None: the stamps are taken,
+        unless they are coarser than the rows.
+    name
+        Of the file and its column, for messages.
+    notes
+        What was done is added here.
+
+    Raises
+    ------
+    ConfigError
+        If the stamps contradict `period`, or repeat themselves in rows that are not evenly sampled.
+    """
+    if len(time) < _FEWEST:
+        return np.arange(len(time), dtype=np.float64) * period if period else _spread(time)
+    if period is not None:
+        return _told(time, period, name, notes)
+    repeated = int(np.count_nonzero(np.diff(time) <= 0.0))
+    if repeated >= _FEW * len(time):
+        return _coarse(time, repeated, name, notes)
+    if repeated:
+        notes.append(f"{repeated} of the stamps repeat the one before: their rows are spread up to the next.")
+        return _spread(time)
+    return _rounded(time, notes)
+
+
+def _rounded(time: Column, notes: list[str]) -> Column:
+    """Return the stamps, or an even grid that they were rounded from."""
+    steps = np.diff(time)
+    resolution = _resolution(steps)
+    if resolution < _FINE * float(np.median(steps)):
+        return time
+    grid = _fit(time, resolution)
+    multiple = grid.period / resolution
+    if grid.spread > 1.05 * resolution + _ROUNDING or abs(multiple - round(multiple)) < _FINE:
+        return time
+    notes.append(_said(grid, f"The stamps are as coarse as {resolution:.4g} s"))
+    return grid.number * grid.period
+
+
+def _coarse(time: Column, repeated: int, name: str, notes: list[str]) -> Column:
+    """Return the even grid behind stamps that many rows share."""
+    steps = np.diff(time)
+    resolution = float(np.quantile(steps[steps > 0.0], 0.95))
+    grid = _fit(time, resolution)
+    if grid.spread > resolution + grid.period:
+        raise ConfigError(
+            f"{name}: {repeated} of {len(time)} stamps repeat the one before, and the rows are not evenly "
+            "sampled by them, so they do not tell when a row was taken. If the rows are evenly sampled, say "
+            f"so: --period T (by the stamps, about {grid.period:.4g} s)."
+        )
+    notes.append(
+        _said(grid, f"{repeated} of the stamps repeat the one before (they are {resolution:.4g} s apart)")
+    )
+    return grid.number * grid.period
+
+
+def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
+    steps = np.diff(time)
+    late = float(np.quantile(np.abs(steps - np.median(steps)), 0.9))
+    resolution = max(2.0 * late, float(np.median(steps[steps > 0.0])) if (steps <= 0.0).any() else 0.0)
+    grid = _fit(time, resolution, period)
+    if abs(grid.period / period - 1.0) > _AGREES:
+        raise ConfigError(
+            f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {period:g} s. Leave "
+            "--period out, or say --time none: then the stamps do not count."
+        )
+    if grid.spread > resolution + grid.period:
+        notes.append(
+            "The rows are not evenly sampled: the stamps are taken, and --period tunes the observer."
+        )
+        return _spread(time)
+    lost = int(grid.number[-1]) - len(time) + 1
+    told = f"{lost} lost rows" if lost else "no lost row"
+    notes.append(f"Evenly sampled, {period:g} s (--period); the stamps show {told}.")
+    return grid.number * period
+
+
+def _fit(time: Column, resolution: float, told: float | None = None) -> _Grid:
+    """Return the even grid that fits the stamps best."""
+    window = min(_WINDOW, len(time) - 1)
+    means = (time[window:] - time[:-window]) / window
+    usual = float(np.median(means))
+    near = np.abs(means - usual) <= (resolution + 0.5 * usual) / window
+    # The mean is right where no row was lost, the smallest and the median step where some were.
+    short = min(_SHORT_WINDOW, len(time) - 1)
+    fewest = float(np.quantile(time[short:] - time[:-short], 0.2)) / short
+    guesses = [float(np.mean(means[near])), fewest, float(np.median(np.diff(time))), told or 0.0]
+    grids = [_refined(time, guess, resolution) for guess in guesses if guess > 0.0]
+    return min(grids, key=lambda grid: grid.spread)
+
+
+def _refined(time: Column, period: float, resolution: float) -> _Grid:
+    number = np.arange(len(time), dtype=np.float64)
+    for _ in range(3):
+        number = _numbered(time, period, resolution)
+        period = float(np.polyfit(number, time, 1)[0])
+    off = time - period * number
+    return _Grid(number, period, float(np.max(off) - np.min(off)))
+
+
+def _numbered(time: Column, period: float, resolution: float) -> Column:
+    """Return a number for each row: one more than the row before, or several where rows were lost.
+
+    A stamp may be late or rounded up, so what counts is the earliest stamp, by its deviation, from a row on.
+    """
+    count = len(time)
+    rows = np.arange(count, dtype=np.float64)
+    ahead = np.minimum.accumulate((time / period - rows)[::-1])[::-1]
+    tail = min(count - 1, 2 * round(resolution / period) + 2)
+    ahead[count - tail :] = ahead[count - tail - 1]  # too near the end to tell late from lost
+    lost, level = np.zeros(count), float(ahead[0])
+    for k in (np.flatnonzero(np.diff(ahead) > 0.0) + 1).tolist():
+        if ahead[k] - level > _LOSS:
+            missing = max(1.0, round(float(ahead[k]) - level))
+            lost[k] = missing
+            level += missing
+    return rows + np.cumsum(lost)
+
+
+def _resolution(steps: Column) -> float:
+    """Return the step of a coarse clock, s; 0 where the steps do not come in a few sizes."""
+    sizes = np.unique(np.round(steps / _ROUNDING))
+    if not 1 < len(sizes) <= _KINDS:
+        return 0.0
+    return float(np.gcd.reduce(sizes.astype(np.int64))) * _ROUNDING
+
+
+def _spread(time: Column) -> Column:
+    """Spread rows with one stamp evenly up to the next one."""
+    first = np.concatenate(([True], np.diff(time) > 0.0))
+    places = np.flatnonzero(first)
+    usual = float(np.median(np.diff(time[places]))) if len(places) > 1 else 1e-3
+    # Behind the last stamp the rows go on at the usual step.
+    known = np.append(places, len(time))
+    spread = np.interp(np.arange(len(time)), known, np.append(time[places], time[-1] + usual))
+    return np.asarray(spread, dtype=np.float64)
+
+
+def _said(grid: _Grid, why: str) -> str:
+    return (
+        f"{why}, and the rows are evenly sampled by them: {grid.period:.6g} s is taken from row to row. "
+        "--period says it exactly."
+    )

@@ -1,0 +1,60 @@
+"""Figures that cannot be true: better an error than a number."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dcmp_hil.replay.figures import Estimates
+    from dcmp_hil.replay.recording import Recording
+    from dcmp_hil.replay.reference import ZeroPhase
+
+_FASTEST = 2000.0  # rad/s, 19,000 rpm
+_HOPELESS = 3.0  # times the motion itself: no observer that follows it is so far off
+_LARGE = 20.0  # rad/s
+
+
+def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.bool_]) -> None:
+    """Refuse a recording that no arm and no motor can have made.
+
+    Raises
+    ------
+    ConfigError
+        With the options that say what the columns are.
+    """
+    fastest = float(np.max(np.abs(reference.velocity[judged])))
+    if fastest > _FASTEST:
+        raise ConfigError(
+            f"{recording.name}: by this recording the arm turns at {fastest:.4g} rad/s "
+            f"({fastest * 60.0 / (2.0 * np.pi):.4g} rpm), which cannot be. Check the units (--position-unit, "
+            "--counts-per-rev, --time-unit), the modulus that the position wraps at (--modulus), and "
+            "--period if you gave it."
+        )
+
+
+def check_estimates(
+    recording: Recording, estimates: Estimates, reference: ZeroPhase, judged: NDArray[np.bool_]
+) -> None:
+    """Refuse figures of an observer that is further off than the motion is large.
+
+    Raises
+    ------
+    ConfigError
+        With the options that are likely to be wrong.
+    """
+    truth = reference.velocity[judged]
+    error = float(np.sqrt(np.mean(np.square(estimates.velocity[judged] - truth))))
+    motion = float(np.sqrt(np.mean(np.square(truth))))
+    if error > max(_LARGE, _HOPELESS * motion):
+        raise ConfigError(
+            f"{recording.name}: a velocity error of {error:.4g} rad/s RMS, in a motion of {motion:.4g} rad/s "
+            "RMS, is no figure of an observer. Check the units (--position-unit, --counts-per-rev, "
+            "--time-unit), the modulus that the position wraps at (--modulus), the input's gain (--ku, "
+            "--inertia), and the observer's gains."
+        )

@@ -1,0 +1,227 @@
+"""The rows of a recording as text: header, units, and what is left out between the rows."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.replay.cells import is_clock, is_value, label_in, unit_in
+from dcmp_hil.replay.decoding import read_lines
+from dcmp_hil.replay.layout import (
+    BLANK,
+    COMMENT,
+    HALF,
+    comma_pairs,
+    find_layout,
+    holds_numbers,
+    is_row,
+    prepared,
+    split,
+)
+from dcmp_hil.replay.units import any_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from dcmp_hil.replay.decoding import Lines
+    from dcmp_hil.replay.layout import Layout
+
+Line = tuple[int, str]  # its number in the file, from 1, and its text
+
+_SHOWN = 50  # characters of a line in a message
+
+
+class Table(NamedTuple):
+    """The rows of a recording as text.
+
+    Parameters
+    ----------
+    path
+        Where it came from.
+    header
+        Names of the columns; their numbers from 1 where the file names none.
+    named
+        Whether the file names its columns.
+    units
+        What a row of units, or the cells themselves, say; empty where they say nothing.
+    rows
+        Fields of each row, one per name in the header.
+    lines
+        Line of the file that each row stands in, from 1.
+    decimal
+        Decimal sign of the file.
+    notes
+        What was left out, one sentence each.
+    """
+
+    path: Path
+    header: list[str]
+    named: bool
+    units: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    decimal: str
+    notes: list[str]
+
+    def column(self, name: str) -> list[str]:
+        """Return the cells of a column."""
+        place = self.header.index(name)
+        return [row[place] for row in self.rows]
+
+
+def read_table(path: Path) -> Table:
+    """Read a text file of columns, and leave out what is no row.
+
+    Delimiter, decimal sign, header and a row of units are found; what stands before the header, between the
+    rows and behind them is left out and counted.
+
+    Parameters
+    ----------
+    path
+        UTF-8, UTF-16 or Windows-1252; fields separated by comma, semicolon, tab, bar or white space.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing, no text, or has no rows.
+    """
+    source = read_lines(path)
+    lines, forced = prepared(source.lines)
+    layout = find_layout(path, [text for _, text in lines], forced)
+    joined = comma_pairs(lines, layout)
+    if joined:
+        lines, layout = joined
+    first = next((k for k, (_, text) in enumerate(lines) if is_row(text, layout, whole=True)), -1)
+    if first < 0:
+        first = next(k for k, (_, text) in enumerate(lines) if is_row(text, layout))
+    header, units, before = _names(lines[:first], layout)
+    rows, numbers, left_out, repeated = _rows(lines[first:], layout, header)
+    if len(left_out) > len(rows):
+        raise ConfigError(
+            f"{path}: {len(left_out)} lines between the rows are no rows of {layout.width} fields, more than "
+            f"there are rows ({len(rows)}); the first is line {left_out[0][0]}: {_shown(left_out[0])}. Save "
+            "it with one row a line and the same number of fields in each (no decimal comma where the comma "
+            "separates the fields)."
+        )
+    notes = [*source.notes, *_said(before, left_out, repeated)]
+    if joined:
+        notes.append("The comma is delimiter and decimal sign: every two fields are one number.")
+    if _torn(rows, source):
+        rows.pop()
+        numbers.pop()
+        notes.append("The last line is unfinished and left out.")
+    header, rows, units = _aligned(header, units, rows, layout)
+    return Table(path, header, header != _numbered(layout.width), units, rows, numbers, layout.decimal, notes)
+
+
+def _said(before: Sequence[Line], left_out: Sequence[Line], repeated: int) -> Iterator[str]:
+    """Say what is left out."""
+    if before:
+        yield f"{_lines(len(before))} before the header left out ({_shown(before[0])})."
+    if repeated:
+        yield f"The header comes {repeated + 1} times; the later ones are left out."
+    if left_out:
+        where = f"the first is line {left_out[0][0]} ({_shown(left_out[0])})"
+        yield f"{_lines(len(left_out))} left out that no row is; {where}."
+
+
+def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str], list[Line]]:
+    """Find the header in the lines above the first row: names, units, and what is neither."""
+    units: list[str] = []
+    for place in range(len(above) - 1, -1, -1):
+        text = above[place][1]
+        for fields in _as_header(text, layout):
+            words = [field for field in fields if field]
+            if not units and len(words) > 0 and _are_units(words) and place > 0:
+                units = fields
+                break
+            if words and sum(is_value(word, layout.decimal) for word in words) < HALF * len(words):
+                return fields, units, [line for line in above[:place] if not COMMENT.match(line[1])]
+    return [], units, [line for line in above if not COMMENT.match(line[1])]
+
+
+def _as_header(text: str, layout: Layout) -> Iterator[list[str]]:
+    """Read a line as names, with the delimiter of the rows or another one, as many as there are columns."""
+    bare = COMMENT.sub("", text, count=1) if COMMENT.match(text) else text
+    fits = {layout.width, layout.width - 1} - {0}
+    for delimiter in (layout.delimiter, ",", ";", "\t", BLANK):
+        fields = split(bare, delimiter)
+        if len(fields) in fits or (len(fields) > layout.width and delimiter == layout.delimiter != BLANK):
+            yield fields
+    # Names with a unit apart from them: `time [s] position [rad]`
+    grouped = re.findall(r"[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?", bare)
+    if len(grouped) == layout.width > 1:
+        yield grouped
+
+
+def _are_units(words: Sequence[str]) -> bool:
+    bracketed = sum(bool(re.fullmatch(r"\(.*\)|\[.*\]", word)) for word in words)
+    known = sum(any_unit(word) or word in ("-", "%", "1") for word in words)
+    return known > HALF * len(words) or bracketed == len(words)
+
+
+def _rows(
+    lines: Sequence[Line], layout: Layout, header: Sequence[str]
+) -> tuple[list[list[str]], list[int], list[Line], int]:
+    rows, numbers, left_out, repeated = [], [], [], 0
+    for number, text in lines:
+        fields = split(text, layout.delimiter)
+        if len(fields) > layout.width and not any(fields[layout.width :]):
+            fields = fields[: layout.width]
+        if len(fields) == layout.width and holds_numbers(fields, layout) and not COMMENT.match(text):
+            rows.append(fields)
+            numbers.append(number)
+        elif header and any(list(header) == candidate for candidate in _as_header(text, layout)):
+            repeated += 1
+        elif not COMMENT.match(text):
+            left_out.append((number, text))
+    return rows, numbers, left_out, repeated
+
+
+def _torn(rows: list[list[str]], source: Lines) -> bool:
+    """Whether the last row, which has no line end, breaks off within its last number."""
+    fewest = 3  # rows that the usual number of decimals is told from
+    if source.ended or len(rows) <= fewest or not source.lines[-1].endswith(rows[-1][-1]):
+        return False
+    decimals = [len(re.split("[.,]", row[-1])[-1]) if re.search("[.,]", row[-1]) else 0 for row in rows]
+    return decimals[-1] < min(decimals[:-1])
+
+
+def _aligned(
+    header: list[str], units: list[str], rows: list[list[str]], layout: Layout
+) -> tuple[list[str], list[list[str]], list[str]]:
+    """Give every column a name and a unit."""
+    width = layout.width
+    first, last = rows[0], layout.width - 1
+    labels = [label_in(cell) or "" for cell in first]
+    if all(labels[column] for column in layout.numeric) and not any(map(is_clock, first)):
+        header = labels
+    if not header:
+        header = _numbered(width)
+    if len(header) == width - 1:
+        # One name too few: behind the last value stands a delimiter, or before the first one a row's number.
+        header = [*header, ""] if not any(row[last] for row in rows) else ["", *header]
+        units = [*units, ""] if not header[-1] else ["", *units]
+    if len(header) > width:
+        rows = [row + [""] * (len(header) - width) for row in rows]
+    header = [name.strip().strip("#%").strip() for name in header]
+    units = (units + [""] * len(header))[: len(header)]
+    cells = [unit_in(cell) or "" for cell in first] + [""] * (len(header) - width)
+    units = [re.sub(r"[\[\]()]", "", told) or cell for told, cell in zip(units, cells, strict=True)]
+    return header, rows, units
+
+
+def _numbered(width: int) -> list[str]:
+    """Return what the columns of a file without names are called."""
+    return [str(column + 1) for column in range(width)]
+
+
+def _lines(count: int) -> str:
+    return "1 line" if count == 1 else f"{count} lines"
+
+
+def _shown(line: Line) -> str:
+    text = "".join(sign if sign.isprintable() else " " for sign in line[1]).strip()
+    return '"' + (text if len(text) <= _SHOWN else text[:_SHOWN] + "...") + '"'

@@ -1,0 +1,117 @@
+"""The options of `replay` for a recording of another program: what the observer is, and what it is told."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.helpers import named
+from tests.replay.synthetic import swing, write
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from dcmp_hil import ObserverContext
+    from dcmp_hil.values import Estimate, Sample
+    from tests.cli.conftest import Outcome
+
+    Cli = Callable[..., Outcome]
+
+MADE: list[tuple[ObserverContext, dict[str, float]]] = []
+
+
+class Mine:
+    """An observer of one's own, that believes in no motion."""
+
+    def __init__(self, context: ObserverContext, **options: float) -> None:
+        MADE.append((context, options))
+
+    def update(self, sample: Sample) -> Estimate:
+        from dcmp_hil.values import Estimate
+
+        return Estimate(sample.position, 0.0, 0.0)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> str:
+    truth = swing(duration=1.5)
+    columns = {"time_s": truth.time, "position_rad": truth.position, "voltage_V": truth.voltage}
+    return str(write(tmp_path / "rec.csv", columns))
+
+
+def figures(cli: Cli, *arguments: str) -> dict[str, Any]:
+    outcome = cli("replay", *arguments, "--no-write", "--json", "-")
+    assert outcome.code == 0, outcome.err
+    found: dict[str, Any] = json.loads(outcome.out)
+    return found
+
+
+def test_an_observer_of_one_s_own_is_told_what_options_and_rig_say(
+    cli: Cli, recording: str, tmp_path: Path
+) -> None:
+    MADE.clear()
+    mine = ("--observer", named(Mine))
+    figures(cli, recording, *mine)
+    told = ("--set", "model.gravity_rad_s2=9.5", "--set", "model.f1_rad_s2=0.25", "--f0", "0.4", "--ku", "3")
+    figures(cli, recording, *mine, *told)
+    rig = tmp_path / "my-rig.toml"
+    rig.write_text(
+        "[model]\ngravity_rad_s2 = 7.0\nf1_rad_s2 = 0.5\nku_rad_s2_V = 2.5\n"
+        "[encoder]\ncounts_per_rev = 2156\n"
+        f'[observer]\nkind = "{named(Mine)}"\noptions = {{ gain = 3.0 }}\n'
+    )
+    figures(cli, recording, "--rig", str(rig))
+    figures(cli, recording, "--rig", str(rig), "--set", "model.f1_rad_s2=0.75", "--counts-per-rev", "1000")
+    usual, by_option, by_rig, by_both = (context for context, _ in MADE)
+    assert usual.model[:4] == (0.1, 1.3, 14.03, 5.4)
+    assert by_option.model[:4] == (0.4, 0.25, 9.5, 3.0)
+    assert by_rig.model[:4] == (0.1, 0.5, 7.0, 2.5)
+    assert by_both.model[:4] == (0.1, 0.75, 7.0, 2.5)
+    assert [context.counts_per_rev for context, _ in MADE][2:] == [2156.0, 1000.0]
+    assert [options for _, options in MADE] == [{}, {}, {"gain": 3.0}, {"gain": 3.0}]
+
+
+@pytest.mark.parametrize(
+    ("short", "keys"),
+    [
+        (("--mu0", "70"), ("observer.mu0_rad_s=70",)),
+        (
+            ("--M", "40", "--L1", "6", "--L2", "8"),
+            ("observer.M_rad_s3=40", "observer.L1_1_s=6", "observer.L2_1_s2=8"),
+        ),
+        (("--f0", "0.5", "--ku", "4"), ("model.f0_1_s=0.5", "model.ku_rad_s2_V=4")),
+        (("--observer", "paper", "--M", "500"), ("observer.kind=paper", "observer.M_rad_s3=500")),
+        (("--counts-per-rev", "1000"), ("encoder.counts_per_rev=1000",)),
+        (("--counts-per-rev", "ideal"), ("encoder.counts_per_rev=ideal",)),
+    ],
+)
+def test_set_says_the_same_as_the_short_options(
+    short: tuple[str, ...], keys: tuple[str, ...], cli: Cli, recording: str
+) -> None:
+    overrides = [word for key in keys for word in ("--set", key)]
+    assert figures(cli, recording, *overrides) == figures(cli, recording, *short) != figures(cli, recording)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--set", "controller.kp_1_s2=5"), "what was measured stays as it was"),
+        (("--set", "observer.mu=5"), "unknown key"),
+        (("--set", "model.f0_1_s=-1"), "model.f0_1_s"),
+        (("--set", "observer.mu0_rad_s=5", "--mu0", "6"), "say the same"),
+        (("--rig", "nowhere.toml"), "nowhere.toml"),
+        (("--modulus", "x"), "--modulus"),
+        (("--modulus", "-1"), "--modulus"),
+        (("--period", "-1"), "--period"),
+        (("--time", "none"), "--period"),
+        (("--no-input", "--voltage", "voltage_V"), "--no-input"),
+        (("--mu0", "5", "--observer", "paper"), "--mu0"),
+    ],
+)
+def test_what_cannot_be_is_refused(options: tuple[str, ...], says: str, cli: Cli, recording: str) -> None:
+    outcome = cli("replay", recording, *options, "--no-write")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert says in outcome.err.replace("\n", " ")
