@@ -13,6 +13,7 @@ import typer
 from dcmp_hil import __version__
 from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.check import check
+from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
 from dcmp_hil.cli.live import set_keys, status, stop
@@ -66,6 +67,7 @@ ON_LINUX: dict[str, Callable[..., None]] = {
     "device": device,
     "ports": ports,
     "monitor": monitor,
+    "conform": conform,
     "set": set_keys,
     "stop": stop,
     "status": status,

@@ -1,0 +1,1 @@
+"""The checks, by section of the page; registry.py has them all."""

@@ -1,0 +1,217 @@
+"""Section 7 with --arm: ten DRIVEs from IDLE to RUN, and every way back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.wire.messages import Parameter, Result, State
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dcmp_hil.conformance.client import Client
+
+_DRIVES = 10
+LOW_MV = 300
+"""mV, what most checks put out: enough to be seen in SAMPLE, too little to do harm."""
+
+
+def to_run(client: Client) -> Iterator[str]:
+    """Count the DRIVEs from IDLE to RUN, until no SAMPLE on the way was missed by this host."""
+    session = client.own()
+    for _ in range(10):
+        first = client.mark()
+        sent = _drives_to_run(client, session)
+        arming = [s.sample for s in client.samples[first:] if s.sample.state == State.ARMING]
+        if any(sample.voltage_mV for sample in arming):
+            yield "SAMPLE says a voltage other than 0 in ARMING"
+        if client.state == State.RUN and sent < _DRIVES:
+            yield f"{sent} DRIVEs lead from IDLE to RUN; ten are needed"
+            return
+        if client.state == State.RUN and not any(sample.missed for sample in arming):
+            if len(arming) != _DRIVES - 1:
+                yield f"{len(arming)} SAMPLEs say ARMING between the first and the tenth DRIVE, not nine"
+            return
+        _disarm(client, session)
+    yield "ten DRIVEs with arm = 1 at 0 V, each answering a SAMPLE, do not lead to RUN"
+
+
+def _drives_to_run(client: Client, session: int) -> int:
+    """Answer SAMPLEs until one says RUN; return how many were answered."""
+    for sent in range(4 * _DRIVES):
+        if client.newest().sample.state == State.RUN:
+            return sent
+        client.drive(session, arm=True)
+    return 4 * _DRIVES
+
+
+def _disarm(client: Client, session: int) -> None:
+    for _ in range(20):
+        client.newest()
+        if client.state == State.IDLE:
+            return
+        client.drive(session)
+    raise NotJudgedError("a DRIVE with arm = 0 does not lead to IDLE: `disarm` says more")
+
+
+def _begin_arming(client: Client, session: int, drives: int = 4) -> bool:
+    """Bring the device to ARMING; return whether it is there."""
+    for _ in range(40):
+        client.newest()
+        if client.state == State.ARMING and drives <= 0:
+            return True
+        client.drive(session, arm=True)
+        drives -= 1
+        if client.state in (State.RUN, State.FAULT):
+            return False
+    return False
+
+
+def broken(client: Client) -> Iterator[str]:
+    """Break the arming sequence in each way."""
+    session = client.own()
+    for what, word in (
+        ("arm = 0", {"arm": False}),
+        ("clear = 1", {"clear": True}),
+        ("a voltage other than 0", {"arm": True, "voltage_mV": 1}),
+    ):
+        if not _begin_arming(client, session):
+            raise NotJudgedError("the device does not stay in ARMING: `arming` says more")
+        client.drive(session, **word)
+        if client.wait_for(State.IDLE, 3) is None:
+            yield f"a DRIVE with {what} does not lead from ARMING to IDLE"
+        _disarm(client, session)
+    if not _begin_arming(client, session):
+        raise NotJudgedError("the device does not stay in ARMING: `arming` says more")
+    client.listen(client.reach + 2)
+    client.newest()
+    client.drive(session, arm=True)
+    if client.wait_for(State.IDLE, 3) is None:
+        yield f"arming goes on though {client.reach + 2} SAMPLEs were not answered"
+    _disarm(client, session)
+    client.newest()
+    client.drive(session, 1, arm=True)
+    client.listen(2)
+    if client.state != State.IDLE:
+        yield "a DRIVE with arm = 1 and a voltage other than 0 leads out of IDLE"
+
+
+def silent(client: Client) -> Iterator[str]:
+    """Fall silent in ARMING."""
+    session = client.own()
+    if not _begin_arming(client, session):
+        raise NotJudgedError("the device does not stay in ARMING: `arming` says more")
+    watchdog = client.value(Parameter.WATCHDOG_MS)
+    first = client.mark()
+    client.listen(client.periods(watchdog) + client.reach + 5)
+    if client.state != State.IDLE:
+        yield f"{watchdog} ms without a DRIVE do not lead from ARMING to IDLE"
+    if any(seen.sample.state == State.FAULT for seen in client.samples[first:]):
+        yield "silence in ARMING leads to FAULT; it leads to IDLE"
+
+
+def run(client: Client, session: int, voltage_mV: int = LOW_MV, ticks: int = 15) -> None:
+    """Arm, and put a voltage out for a while.
+
+    Raises
+    ------
+    NotJudgedError
+        If the device leaves RUN meanwhile.
+    """
+    client.arm(session)
+    client.answer(ticks, session, voltage_mV)
+    if client.state != State.RUN:
+        raise NotJudgedError("the device left RUN while each SAMPLE was answered")
+
+
+def disarm(client: Client) -> Iterator[str]:
+    """Disarm while a voltage is put out."""
+    session = client.own()
+    for what, word in (
+        ("arm = 0", {"arm": False}),
+        ("clear = 1", {"clear": True}),
+        ("release = 1", {"release": True}),
+    ):
+        run(client, session)
+        client.newest()
+        mark = client.mark()
+        client.drive(session, LOW_MV, **word)
+        since = client.after_fence(mark)
+        if client.state != State.IDLE:
+            yield f"a DRIVE with {what} does not lead from RUN to IDLE"
+        if any(seen.sample.state == State.IDLE and seen.sample.voltage_mV for seen in since):
+            yield f"after a DRIVE with {what} SAMPLE says IDLE and a voltage; 0 V come at once"
+    found = client.hello()
+    if found is not None and found.busy:
+        yield "a DRIVE with release = 1 in RUN does not end the ownership"
+
+
+def stopped_in_run(client: Client) -> Iterator[str]:
+    """Send STOP while a voltage is put out; then go on driving: it stays off."""
+    session = client.own()
+    run(client, session)
+    mark = client.mark()
+    client.stop(3)
+    since = client.after_fence(mark)
+    if client.state != State.FAULT:
+        yield "STOP does not lead from RUN to FAULT"
+        return
+    if any(seen.sample.state == State.FAULT and seen.sample.voltage_mV for seen in since):
+        yield "after STOP SAMPLE says FAULT and a voltage; 0 V come at once"
+    later = client.answer(20, session)
+    if any(seen.sample.state != State.FAULT for seen in later):
+        yield "DRIVEs with arm = 1 lead out of FAULT"
+
+
+def second_host(client: Client) -> Iterator[str]:
+    """Let a second host try, while the first drives."""
+    session = client.own()
+    run(client, session)
+    other = client.another_session()
+    client.newest()
+    client.drive(session, LOW_MV, arm=True)
+    found = client.hello(other)
+    client.newest()
+    client.drive(session, LOW_MV, arm=True)
+    if found is not None and (found.owned or not found.busy):
+        yield "a HELLO of a second host in RUN is not answered by busy"
+    for _ in range(8):
+        client.newest()
+        client.drive(session, LOW_MV, arm=True)
+        client.drive(other, -LOW_MV, arm=True)
+    seen = client.answer(3, session, LOW_MV)
+    if any(one.sample.voltage_mV < 0 for one in seen):
+        yield "a DRIVE of a session that does not own the device was applied"
+
+
+def not_idle(client: Client) -> Iterator[str]:
+    """Try to change a limit in RUN."""
+    session = client.own()
+    client.arm(session)
+    client.newest()
+    client.drive(session, arm=True)
+    found = client.put(session, Parameter.VOLTAGE_LIMIT_MV, 1)
+    if found is None:
+        yield "PARAMETER_SET is not answered in RUN"
+    elif found.result != Result.NOT_IDLE or found.value == 1:
+        yield f"PARAMETER_SET in RUN is answered by result {found.result}, value {found.value}, not by 4"
+
+
+CHECKS = (
+    Check("arming", "7", "Ten DRIVEs at 0 V lead from IDLE to RUN.", to_run, needs_arm=True),
+    Check("arming-broken", "7", "A broken arming sequence leads to IDLE.", broken, needs_arm=True),
+    Check("arming-silent", "8", "Silence in ARMING leads to IDLE.", silent, needs_arm=True),
+    Check(
+        "disarm", "7", "arm = 0, clear = 1 and release = 1 end RUN at 0 V at once.", disarm, needs_arm=True
+    ),
+    Check(
+        "stop-in-run",
+        "7",
+        "STOP in RUN leads to FAULT at 0 V at once, and nothing leads from FAULT to RUN.",
+        stopped_in_run,
+        needs_arm=True,
+    ),
+    Check("second-host", "5", "A second host changes nothing in RUN.", second_host, needs_arm=True),
+    Check("parameters-in-run", "9", "PARAMETER_SET is refused in RUN.", not_idle, needs_arm=True),
+)

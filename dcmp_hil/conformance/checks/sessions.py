@@ -1,0 +1,197 @@
+"""Section 5: who owns the device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.wire.messages import Hello, Identity, Parameter, Result
+from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dcmp_hil.conformance.client import Client
+
+_LEASE_MS = 500
+_NEAR_MS = 60  # a question at that distance of the end is safe on a slow line
+
+
+def _said(client: Client, session: int, expected: str, when: str, wrong: int = 0) -> Iterator[str]:
+    """Compare IDENTITY's flags: letters of busy, owned, mismatch."""
+    identity = client.hello(session, wrong)
+    if identity is None:
+        yield f"{when}: HELLO is not answered"
+        return
+    flags = "".join(
+        letter for letter, on in (("b", identity.busy), ("o", identity.owned), ("m", identity.mismatch)) if on
+    )
+    if flags != expected:
+        yield f"{when}: IDENTITY says {_words(flags)}, the page {_words(expected)}"
+
+
+def _words(flags: str) -> str:
+    names = {"b": "busy", "o": "owned", "m": "mismatch"}
+    return " + ".join(names[letter] for letter in flags) or "neither busy, owned nor mismatch"
+
+
+def identity(client: Client) -> Iterator[str]:
+    """Ask who is there, with the right hash and a wrong one."""
+    found = client.hello()
+    if found is None:
+        yield "HELLO with session 0 is not answered by IDENTITY"
+        return
+    if found.protocol_hash != PROTOCOL_HASH:
+        yield (
+            f"the device's protocol hash is {found.protocol_hash:08x}, this page's {PROTOCOL_HASH:08x}: it "
+            "was built from another dcmp.dbc"
+        )
+    yield from _said(client, 0, "", "HELLO with session 0")
+    yield from _said(client, 0, "m", "HELLO with session 0 and another hash", wrong=1)
+    yield from _said(client, client.another_session(), "m", "HELLO with another hash", wrong=1 << 31)
+    yield from _said(client, 0, "", "HELLO with session 0 after one with another hash")
+
+
+def ownership(client: Client) -> Iterator[str]:
+    """Own the device, and be refused as a second host."""
+    session, other = client.another_session(), 0
+    yield from _said(client, session, "o", "the first HELLO with a session")
+    other = client.another_session()
+    yield from _said(client, other, "b", "HELLO of a second host")
+    yield from _said(client, 0, "b", "HELLO with session 0 while it is owned")
+    yield from _said(client, session, "o", "HELLO of the owner")
+    yield from _said(client, session, "om", "HELLO of the owner with another hash", wrong=1)
+    mark = client.mark()
+    client.drive(other)
+    if any(not seen.sample.missed for seen in client.after_fence(mark)):
+        yield "a DRIVE of a session that does not own the device was accepted"
+
+
+def repeated_hello(client: Client) -> Iterator[str]:
+    """HELLO of the owner again: nothing begins anew."""
+    session = client.own()
+    built = client.value(Parameter.VOLTAGE_LIMIT_MV)
+    answer = client.put(session, Parameter.VOLTAGE_LIMIT_MV, 1)
+    if answer is None or answer.result != Result.OK:
+        raise NotJudgedError("VOLTAGE_LIMIT_MV could not be lowered: `parameters-range` says more")
+    _accepted(client, session)
+    before = client.health().sequence_gaps
+    yield from _said(client, session, "o", "HELLO of the owner")
+    if (now := client.value(Parameter.VOLTAGE_LIMIT_MV)) != 1:
+        yield (
+            f"VOLTAGE_LIMIT_MV was set to 1 of {built} and is {now} after the owner's second HELLO: that is "
+            "no new ownership"
+        )
+    mark = client.mark()
+    client.newest()
+    client.drive(session)
+    client.drive(session)  # the same seq: refused by its order
+    client.send(Hello(session, PROTOCOL_HASH))
+    client.drive(session)  # and still, after another HELLO
+    client.after_fence(mark)
+    grown = client.health().sequence_gaps - before
+    if before < _SOME and grown < 2:  # noqa: PLR2004 - two were sent
+        yield "a DRIVE with the seq of the one before was accepted after the owner's second HELLO"
+
+
+_SOME = 240  # a counter of HEALTH below this has room
+
+
+def _accepted(client: Client, session: int) -> None:
+    """Have a DRIVE accepted: order has a predecessor then."""
+    for _ in range(50):
+        client.newest()
+        mark = client.mark()
+        client.drive(session)
+        if any(not seen.sample.missed for seen in client.after_fence(mark)):
+            return
+    raise NotJudgedError("no DRIVE was accepted: `drive-accepted` says more")
+
+
+def two_hellos(client: Client) -> Iterator[str]:
+    """Send HELLO twice at once, as a host does that repeats it: both are answered, both say owned."""
+    session = client.another_session()
+    client.sessions.append(session)
+    client.drain()
+    at = len(client.heard)
+    client.send(Hello(session, PROTOCOL_HASH))
+    client.send(Hello(session, PROTOCOL_HASH))
+    client.listen(client.periods(50))
+    found = [message for message in client.heard[at:] if isinstance(message, Identity)]
+    if len(found) != 2:  # noqa: PLR2004 - two were sent
+        yield f"two HELLOs sent at once were answered {len(found)} times"
+    elif not all(one.owned and not one.busy for one in found):
+        yield "of two HELLOs of one session, sent at once, not both were answered by owned"
+
+
+def release(client: Client) -> Iterator[str]:
+    """Give the device back by a DRIVE."""
+    session = client.own()
+    for _ in range(20):
+        client.newest()
+        client.drive(session, release=True)
+        client.listen(2)
+        found = client.hello()
+        if found is not None and not found.busy:
+            break
+    else:
+        yield "a DRIVE with release = 1 does not end the ownership"
+        return
+    yield from _said(client, client.another_session(), "o", "HELLO of another host after a release")
+
+
+def lease(client: Client) -> Iterator[str]:
+    """Fall silent: questions of others renew nothing, and after 500 ms the device is free."""
+    session = client.own()
+    client.get(Parameter.TICK)
+    asked = client.tick
+    client.listen(client.periods(_LEASE_MS - _NEAR_MS))
+    answer = client.hello()  # of nobody: renews nothing
+    if client.tick - asked < client.periods(_LEASE_MS) and answer is not None and not answer.busy:
+        yield f"the ownership was over {client.tick - asked} periods after the owner's HELLO, before 500 ms"
+    client.listen(client.periods(2 * _NEAR_MS))
+    answer = client.hello()
+    if answer is not None and answer.busy:
+        yield (
+            f"the ownership lasts {client.tick - asked} periods after the owner's last message; it ends "
+            "after 500 ms"
+        )
+    session = client.own()
+    for _ in range(3):  # a PARAMETER_SET counts, whatever its result
+        client.listen(client.periods(_LEASE_MS - 2 * _NEAR_MS))
+        client.put(session, Parameter.TICK, 0)
+    answer = client.hello()
+    if answer is not None and not answer.busy:
+        yield "a PARAMETER_SET of the owner does not renew its ownership"
+
+
+def as_built(client: Client) -> Iterator[str]:
+    """Change a parameter, give the device back, own it again, as another host and as the same."""
+    for again in (False, True):
+        session = client.own()
+        built = client.value(Parameter.WATCHDOG_MS)
+        other = 17 if built != 17 else 16  # noqa: PLR2004 - any other will do
+        client.put(session, Parameter.WATCHDOG_MS, other)
+        for _ in range(20):
+            client.newest()
+            client.drive(session, release=True)
+            client.listen(2)
+            found = client.hello()
+            if found is not None and not found.busy:
+                break
+        client.hello(session if again else client.another_session())
+        if (now := client.value(Parameter.WATCHDOG_MS)) != built:
+            who = "the same session" if again else "another session"
+            yield f"WATCHDOG_MS is {now} when {who} is given the device; it was built with {built}"
+        client.listen(client.periods(_LEASE_MS + 2 * _NEAR_MS))
+
+
+CHECKS = (
+    Check("identity", "5", "HELLO is answered by IDENTITY, which says the hash.", identity),
+    Check("ownership", "5", "One session owns the device, a second host is refused.", ownership),
+    Check("repeated-hello", "5", "A HELLO of the owner is no new ownership.", repeated_hello, timed=True),
+    Check("two-hellos", "10", "A HELLO sent twice is answered twice, and owns once.", two_hellos),
+    Check("release", "5", "A DRIVE with release = 1 ends the ownership.", release, timed=True),
+    Check("lease", "5", "Ownership ends 500 ms after the owner's last message.", lease, timed=True),
+    Check("as-built", "9", "Every new owner finds the parameters as they were built.", as_built, timed=True),
+)

@@ -1,0 +1,34 @@
+"""Every check, in the order in which they run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.conformance.checks import (
+    arming,
+    carriers,
+    drives,
+    faults,
+    frames,
+    parameters,
+    running,
+    sessions,
+    timing,
+    watchdog,
+)
+
+if TYPE_CHECKING:
+    from dcmp_hil.conformance.check import Check
+
+CHECKS: tuple[Check, ...] = (
+    *frames.CHECKS,
+    *carriers.CHECKS,
+    *timing.CHECKS,
+    *sessions.CHECKS,
+    *drives.CHECKS,
+    *faults.CHECKS,
+    *parameters.CHECKS,
+    *arming.CHECKS,
+    *running.CHECKS,
+    *watchdog.CHECKS,
+)

@@ -1,0 +1,197 @@
+"""`dcmp-hil conform` of an installed wheel, against devices behind pseudo terminals."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import threading
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.conformance.registry import CHECKS
+from sim_backend.board.virtual_device import VirtualDevice
+from tests.conformance.seeded import SEEDS
+from tests.contract.pump import PtyPort
+from tests.firmware.core_library import compiler
+from tests.helpers import bench
+from tests.installed import environment
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from tests.installed import Finished
+
+    Script = Callable[..., Finished]
+
+BOUND = 120.0  # s, of one process: these machines are shared
+WARNING = "warning: With --arm the motor is switched on"
+
+
+@contextmanager
+def started(installed: Path, folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [str(installed), *arguments],
+        cwd=folder,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate(timeout=BOUND)
+
+
+@contextmanager
+def device_command(installed: Path, folder: Path, link: str) -> Iterator[str]:
+    """Run `dcmp-hil device`; give its port."""
+    compiler()
+    with started(installed, folder, "device", "--link", link) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+
+
+@contextmanager
+def virtual_device() -> Iterator[VirtualDevice]:
+    """Run a device whose output can be looked at."""
+    compiler()
+    with VirtualDevice(bench(), clock=MonotonicClock()) as device:
+        device.start()
+        yield device
+
+
+def wait_for(holds: Callable[[], bool]) -> None:
+    until = time.monotonic() + BOUND
+    while not holds():
+        assert time.monotonic() < until
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize("link", ["cobs", "slcan"])
+def test_the_virtual_device_passes(script: Script, installed: Path, tmp_path: Path, link: str) -> None:
+    with device_command(installed, tmp_path, link) as port:
+        done = script("conform", port, "--arm", "--yes", "--json", "conform.json", timeout=BOUND)
+    report = json.loads((tmp_path / "conform.json").read_text("utf-8"))
+    assert {one["name"]: one["findings"] for one in report["checks"] if one["verdict"] == "failed"} == {}
+    assert done.code == 0
+    assert done.err.startswith(WARNING)
+    assert done.err.count("\n") == 1
+    assert (report["link"], report["armed"], report["ended_by"]) == (link, True, "finished")
+    assert [one["name"] for one in report["checks"]] == [check.name for check in CHECKS]
+    assert report["counts"]["passed"] + report["counts"]["not judged"] >= 47
+    assert report["counts"]["passed"] >= 40  # a busy computer is late, and says so
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["conform.json"]
+
+
+def test_without_arm_nothing_is_armed(script: Script, tmp_path: Path) -> None:
+    with virtual_device() as device:
+        done = script("conform", device.port, "--json", "-", timeout=BOUND)
+        assert not any(output.enable or output.voltage_mV for output in device.log)
+    report = json.loads(done.out)
+    assert done.code == 0, done.err
+    assert report["counts"]["needs --arm"] == sum(check.needs_arm for check in CHECKS)
+    assert report["counts"]["failed"] == 0
+    assert done.err.splitlines()[-1].endswith("needs --arm")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_the_device_is_off_however_it_ends(installed: Path, tmp_path: Path, number: signal.Signals) -> None:
+    with virtual_device() as device:
+        arguments = ("conform", device.port, "--arm", "--yes", "--only", "corrupt-link", "--only", "voltage")
+        with started(installed, tmp_path, *arguments) as process:
+            wait_for(lambda: device.output.voltage_mV != 0)
+            process.send_signal(number)
+            out, err = process.communicate(timeout=BOUND)
+            wait_for(lambda: not device.output.enable and device.output.voltage_mV == 0)
+            ticks = device.tick_count
+            wait_for(lambda: device.tick_count > ticks + 100)
+            assert not any(output.enable for output in list(device.log)[-50:])
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGKILL: -9}[number]
+    if number != signal.SIGKILL:
+        assert out.endswith("ended before the last\n")
+        assert err.startswith(WARNING)
+        assert err.count("\n") == 1
+
+
+@contextmanager
+def faulty(error: str) -> Iterator[str]:
+    """Run a device with an error in a thread, a millisecond a tick; give its port."""
+    make, carrier, _ = SEEDS[error]
+    device, port, ending = make(carrier=carrier), PtyPort(), threading.Event()
+
+    def tick() -> None:
+        due = time.monotonic()
+        while not ending.is_set():
+            device.tick(0)
+            due += 1e-3
+            while (left := due - time.monotonic()) > 0:
+                port.exchange(device, left)  # type: ignore[arg-type]
+            port.exchange(device, 0.0)  # type: ignore[arg-type]
+
+    thread = threading.Thread(target=tick, daemon=True)
+    thread.start()
+    try:
+        yield port.path
+    finally:
+        ending.set()
+        thread.join(BOUND)
+        port.close()
+
+
+def test_an_error_of_a_device_is_named(script: Script) -> None:
+    error = "crc16 is not checked"
+    *_, name = SEEDS[error]
+    with faulty(error) as port:
+        done = script("conform", port, "--only", name, "--only", "identity", "--json", "-", timeout=BOUND)
+    report = json.loads(done.out)
+    assert done.code == 1, done.err
+    assert {one["name"]: one["verdict"] for one in report["checks"]} == {name: "failed", "identity": "passed"}
+    assert report["checks"][0]["findings"][0] in done.err
+
+
+def test_it_asks_before_anything_moves(script: Script) -> None:
+    with virtual_device() as device:
+        done = script("conform", device.port, "--arm")
+        assert device.output.owner == 0
+    assert (done.code, done.out) == (2, "")
+    assert done.err.splitlines()[1:] == [
+        "error: --arm: there is no terminal to confirm at. Add --yes if the motor may move."
+    ]
+
+
+def test_no_device_is_an_error_with_a_remedy(script: Script) -> None:
+    master, slave = os.openpty()
+    try:
+        done = script("conform", os.ttyname(slave))
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert (done.code, done.out) == (3, "")
+    assert done.err.startswith("error: /dev/pts/")
+    assert "nothing came within 2 s. Look at --baud" in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_a_check_that_does_not_exist_is_refused(script: Script) -> None:
+    done = script("conform", "/dev/pts/0", "--only", "nothing")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == (
+        "error: --only nothing: there is no such check. `dcmp-hil conform --list` names them all.\n"
+    )
+
+
+def test_the_checks_are_listed(script: Script) -> None:
+    done = script("conform", "--list")
+    assert (done.code, done.err) == (0, "")
+    assert [line.split()[0] for line in done.out.splitlines()] == [check.name for check in CHECKS]
