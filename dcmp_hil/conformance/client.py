@@ -43,6 +43,11 @@ class Client(Listener):
         self.listen(2)
         return self.samples[mark:]
 
+    def settled_state(self) -> int:
+        """Return the state once the device has had all that was sent."""
+        self.after_fence(len(self.samples))
+        return self.state
+
     def send(self, message: Message) -> None:
         """Send a message."""
         self.line.send(pack(message, self.node))

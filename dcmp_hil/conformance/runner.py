@@ -83,16 +83,22 @@ def _begin(client: Client, *, clear: bool) -> None:
 
 def _run(client: Client, check: Check) -> Outcome:
     """Run a check; again, if this host was late and that may be the cause of what was found."""
-    for _ in range(_TRIES):
-        stalls = client.stalls
-        outcome = _run_once(client, check)
-        timed = check.timed or check.needs_arm
-        if outcome.verdict == Verdict.PASSED or client.stalls == stalls or not timed:
+    outcome, late = _try(client, check)
+    for _ in range(_TRIES - 1):
+        if not late or _settle(client):
             return outcome
-        if _settle(client):
-            return outcome
-    late = f"in each of {_TRIES} tries this computer or its port was too late to answer; in the last one:"
-    return Outcome(check, Verdict.NOT_JUDGED, (late, *outcome.findings))
+        outcome, late = _try(client, check)
+    if not late:
+        return outcome
+    why = f"in each of {_TRIES} tries this computer or its port was too late to answer; in the last one:"
+    return Outcome(check, Verdict.NOT_JUDGED, (why, *outcome.findings))
+
+
+def _try(client: Client, check: Check) -> tuple[Outcome, bool]:
+    stalls = client.stalls
+    outcome = _run_once(client, check)
+    timed = check.timed or check.needs_arm
+    return outcome, timed and outcome.verdict != Verdict.PASSED and client.stalls > stalls
 
 
 def _run_once(client: Client, check: Check) -> Outcome:

@@ -75,13 +75,13 @@ def split_frames(client: Client) -> Iterator[str]:
     for byte in hello:
         line.write(bytes([byte]))
         client.listen()
-    client.listen(5)
+    client.settled_state()
     came = sum(isinstance(message, Identity) for message in client.heard[at:])
     if came != 1:
         yield f"a HELLO whose bytes came one by one, a period apart, was answered {came} times"
     at = len(client.heard)
     line.write(2 * hello)
-    client.listen(client.periods(20))
+    client.settled_state()
     came = sum(isinstance(message, Identity) for message in client.heard[at:])
     if came != 2:  # noqa: PLR2004 - two were sent
         yield f"two HELLOs in one write were answered {came} times"

@@ -30,7 +30,7 @@ def accepted(client: Client) -> Iterator[str]:
     if not any(was_accepted(client, lambda: client.drive(session)) for _ in range(_TRIES)):
         yield f"none of {_TRIES} DRIVEs, each answering the newest SAMPLE, was accepted"
         return
-    client.listen(3)
+    client.settled_state()
     if any(not seen.sample.missed for seen in client.listen(20)):
         yield "SAMPLE says missed = 0 in periods without a DRIVE"
     if client.state != State.IDLE:

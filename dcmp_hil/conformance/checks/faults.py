@@ -26,7 +26,7 @@ def stopped(client: Client, reason: int = 0) -> None:
         If it does not come: `stop` says more.
     """
     client.stop(reason)
-    if client.wait_for(State.FAULT, 5) is None:
+    if client.settled_state() != State.FAULT:
         raise NotJudgedError("STOP does not lead to FAULT: `stop` says more")
 
 
@@ -35,7 +35,8 @@ def stop(client: Client) -> Iterator[str]:
     client.drain()
     at = len(client.heard)
     client.stop(_REASON)
-    first = client.wait_for(State.FAULT, 5)
+    since = client.after_fence(len(client.samples))
+    first = next((seen for seen in since if seen.sample.state == State.FAULT), None)
     if first is None:
         yield "STOP does not lead from IDLE to FAULT; it is obeyed from anyone"
         return
@@ -130,8 +131,7 @@ def of_one_session(client: Client) -> Iterator[str]:
     for _ in range(3):
         client.newest()
         client.drive(second, clear=True)
-    client.listen(3)
-    if client.state != State.FAULT:
+    if client.settled_state() != State.FAULT:
         yield "a fault was cleared by the DRIVEs of two sessions"
 
 

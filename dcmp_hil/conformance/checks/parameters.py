@@ -150,7 +150,7 @@ def idle_only(client: Client) -> Iterator[str]:
     """Set in FAULT, where STOP leads from IDLE without a motor that moves."""
     session = client.own()
     client.stop()
-    if client.wait_for(State.FAULT, 5) is None:
+    if client.settled_state() != State.FAULT:
         yield "STOP does not lead from IDLE to FAULT"
         return
     yield from _tried(client, session, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_IDLE)

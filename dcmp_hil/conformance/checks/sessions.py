@@ -116,7 +116,7 @@ def two_hellos(client: Client) -> Iterator[str]:
     at = len(client.heard)
     client.send(Hello(session, PROTOCOL_HASH))
     client.send(Hello(session, PROTOCOL_HASH))
-    client.listen(client.periods(50))
+    client.settled_state()
     found = [message for message in client.heard[at:] if isinstance(message, Identity)]
     if len(found) != 2:  # noqa: PLR2004 - two were sent
         yield f"two HELLOs sent at once were answered {len(found)} times"

@@ -132,8 +132,11 @@ def answers(client: Client) -> Iterator[str]:
     at = len(client.heard)
     for _ in range(_ANSWERS):
         client.send(ParameterGet(Parameter.PERIOD_US))
-    client.listen(client.periods(100))
-    came = sum(isinstance(message, ParameterValue) for message in client.heard[at:])
+    client.settled_state()
+    came = sum(
+        isinstance(message, ParameterValue) and message.id == Parameter.PERIOD_US
+        for message in client.heard[at:]
+    )
     if came != _ANSWERS:
         yield f"{_ANSWERS} questions sent at once were answered {came} times"
 
