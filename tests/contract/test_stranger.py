@@ -339,6 +339,32 @@ def test_age(host: Callable[..., Host], period_us: int, reach: int) -> None:
     assert h.health()["sequence_gaps"] == 4
 
 
+def test_age_goes_by_the_counter_whether_samples_came_or_not(ready: Host) -> None:
+    for _ in range(5):  # the host hears nothing of these
+        ready.device.tick(0)
+        (ready.device.transmit_frames if ready.carrier == "can" else ready.device.transmit)()
+    ready.drive(arm=1)  # answers the newest SAMPLE that it heard
+    ready.ticks += 5
+    assert ready.tick().missed
+    assert ready.get(wire.TICK) == (wire.OK, ready.ticks)
+    ready.drive(arm=1)
+    assert not ready.tick().missed
+    assert ready.health()["sequence_gaps"] >= 1
+
+
+@pytest.mark.parametrize("drives", [4, 10])
+def test_a_hello_of_the_owner_again_changes_nothing(ready: Host, drives: int) -> None:
+    for _ in range(drives):
+        ready.drive(arm=1)
+        assert ready.tick().state in {ARMING, RUN}
+    before = ready.tick().state
+    assert ready.hello() == ready.hello() == "o"
+    ready.drive(arm=1, back=ready.ticks % 8192)  # far too old, as it was before
+    ready.drive(900, arm=1) if before == RUN else ready.drive(arm=1)
+    assert ready.tick().state == before
+    assert ready.device.applied_mV == (900 if before == RUN else 0)
+
+
 def test_order(ready: Host) -> None:
     for _ in range(5):
         ready.tick()

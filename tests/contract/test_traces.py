@@ -1,0 +1,259 @@
+"""The traces of section 8: what is on disk is what the core does, and another device does the same."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from copy import deepcopy
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from sim_backend.board import build, hostlib
+from tests.conformance.seeded import SEEDS
+from tests.contract.firmware_device import Firmware
+from tests.contract.stranger import Stranger
+from tests.contract.stranger_motion import Motion
+from tools.traces import __main__ as tool
+from tools.traces.scenarios import SCENARIOS
+from tools.traces.steps import differences
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+TRACES: dict[str, Any] = {
+    path.stem: json.loads(path.read_text("utf-8")) for path in sorted(tool.FOLDER.glob("*.json"))
+}
+
+
+def found_by(make: Callable[..., Any]) -> list[str]:
+    """Return the traces that a device does not follow."""
+    return [
+        name
+        for name, trace in TRACES.items()
+        if differences(make(carrier="can", **trace["built"]), trace["steps"])
+    ]
+
+
+def test_the_files_and_the_page_are_what_the_core_does() -> None:
+    made = tool.files()
+    assert set(made) == {tool.PAGE, *(tool.FOLDER / f"{name}.json" for name in SCENARIOS)}
+    assert set(TRACES) == set(SCENARIOS)
+    for path, text in made.items():
+        assert path.read_text("utf-8") == text, f"{path}: python -m tools.traces"
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_both_devices_follow_every_trace(name: str) -> None:
+    trace = TRACES[name]
+    for make in (Firmware, Stranger):
+        assert differences(make(carrier="can", **trace["built"]), trace["steps"]) == []
+
+
+def test_every_state_and_every_fault_of_section_8_is_in_a_trace() -> None:
+    page = tool.PAGE.read_text("utf-8")
+    for fault in (
+        *("HOST_SILENT", "LINK_DOWN", "STOPPED", "CORRUPT_LINK", "OVER_SPEED", "OVER_TRAVEL", "ENCODER_JUMP"),
+    ):
+        assert f"FAULT({fault})" in page
+    states = {step["state"] for trace in TRACES.values() for step in trace["steps"]}
+    assert states == {"IDLE", "ARMING", "RUN", "FAULT"}
+
+
+def _changes(step: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Change each thing that a step says of the device."""
+    yield step | {"state": "RUN" if step["state"] != "RUN" else "IDLE"}
+    yield step | {"mV": step["mV"] + 1}
+    yield step | {"enable": 1 - step["enable"]}
+    for at, frame in enumerate(step.get("sent", ())):
+        other = frame[:-1] + ("0" if frame[-1] != "0" else "1")
+        yield step | {"sent": [*step["sent"][:at], other, *step["sent"][at + 1 :]]}
+        yield step | {"sent": [*step["sent"][:at], *step["sent"][at + 1 :]]}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_changed_trace_is_noticed(name: str) -> None:
+    trace = TRACES[name]
+    last = len(trace["steps"]) - 1
+    for number in {0, 1, last // 2, last - 1, last}:
+        for changed in _changes(trace["steps"][number]):
+            steps = deepcopy(trace["steps"])
+            steps[number] = changed
+            wrong = differences(Firmware(carrier="can", **trace["built"]), steps)
+            assert [one.partition(":")[0] for one in wrong] == [f"step {number}"], changed
+
+
+def test_the_check_names_what_is_stale(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["traces", "--check"])
+    with pytest.raises(SystemExit) as ended:
+        tool.main()
+    assert (ended.value.code, capsys.readouterr().out) == (False, "")
+    folder = tmp_path / "traces"
+    shutil.copytree(tool.FOLDER, folder)
+    path = folder / "jumps.json"
+    path.write_text(path.read_text("utf-8").replace("ARMING", "RUN", 1), encoding="utf-8")
+    (folder / "left-over.json").write_text("{}", encoding="utf-8")
+    monkeypatch.setattr(tool, "FOLDER", folder)
+    monkeypatch.setattr(tool, "_ROOT", tmp_path)
+    monkeypatch.setattr(tool, "PAGE", _copy_of_page(tmp_path))
+    with pytest.raises(SystemExit) as ended:
+        tool.main()
+    said = capsys.readouterr().out.splitlines()
+    assert ended.value.code is True
+    assert sorted(line.split()[0] for line in said) == ["traces/jumps.json", "traces/left-over.json"]
+
+
+def _copy_of_page(folder: Path) -> Path:
+    page = folder / "protocol.md"
+    page.write_text(tool.PAGE.read_text("utf-8"), encoding="utf-8")
+    return page
+
+
+# ------------------------------------------------------------------ errors that the traces find
+
+IN_STATES = (
+    *("nine DRIVEs arm", "arming goes on over gaps", "arming with a voltage", "silence in ARMING is a fault"),
+    *("silence in ARMING is nothing", "clear needs no DRIVE without it", "two sessions clear a fault"),
+    *("clear with a voltage", "clear does not disarm", "release clears a fault", "the last cause stays"),
+    *("corrupt frames never end RUN", "the voltage stays after RUN", "a period too much of age"),
+    *("a period too little of age", "order is not checked", "a second host's DRIVE is applied"),
+    *("voltage is a period late", "the voltage is not held", "limited is never said", "the limit is doubled"),
+    *("the slew limit is ignored", "no watchdog", "the watchdog is 3 ms late", "the watchdog is 3 ms early"),
+    *("ttl_ms is ignored", "refused DRIVEs feed the watchdog", "HELLO feeds the watchdog", "no travel limit"),
+    *("FAULT is said once", "arm leads out of FAULT"),
+)
+
+
+@pytest.mark.parametrize("error", IN_STATES)
+def test_the_traces_find_an_error_in_the_states(error: str) -> None:
+    assert found_by(SEEDS[error][0])
+
+
+class Changed(Motion):
+    """An encoder whose limits are a little wrong."""
+
+    speed_factor = 1.0
+    travel_more = 0
+    jumps = 3
+
+    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+        while len(self._jumps) > self.jumps:
+            self._jumps.popleft()
+        yield from super().limits(jump, int(speed_limit * self.speed_factor), travel_limit + self.travel_more)
+
+
+class Slack(Changed):
+    speed_factor = 1.04
+
+
+class Tight(Changed):
+    speed_factor = 0.96
+
+
+class Farther(Changed):
+    travel_more = 1
+
+
+class NoMedian(Motion):
+    def _moved(self, periods: int) -> int:
+        return self._counts[-1] - self._counts[-1 - periods]
+
+
+class NoMedianOfTravel(Motion):
+    def _travelled(self) -> int:
+        return self._counts[-1]
+
+
+class OneWindow(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+        for code, detail in super().limits(jump, speed_limit, travel_limit):
+            if code != 5 or abs(self._moved(self._periods)) - 1 > speed_limit * self._period_us * 1e-6:
+                yield code, detail
+
+
+class NoRepair(Motion):
+    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+        before = list(self._counts)
+        jump = super().latch(counts, tick, speed_limit)
+        change = (counts - (self._raw_before if self._raw_before is not None else counts)) % 2**24
+        change -= 2**24 * (change >= 2**23)
+        self._counts[-1] = before[-1] + (0 if jump else change)
+        self._raw_before = counts
+        return jump
+
+    _raw_before: int | None = None
+
+
+class JumpsAreSpeed(Motion):
+    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+        return super().latch(counts, tick, 1000 * speed_limit)
+
+
+class TwoJumps(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+        if jump and len(self._jumps) >= 2 and self._now - self._jumps[-2] < 100:
+            yield 7, jump
+        yield from super().limits(jump, speed_limit, travel_limit)
+
+
+class LongMemory(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+        if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 160:
+            yield 7, jump
+        yield from super().limits(jump, speed_limit, travel_limit)
+
+
+class NewOrigin(Motion):
+    def armed(self) -> None:
+        self._zero = self._travelled()
+
+
+class SixteenBits(Motion):
+    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+        return super().latch(counts & 0xFFFF, tick, speed_limit)
+
+
+MOTIONS = (
+    *(Slack, Tight, Farther, NoMedian, NoMedianOfTravel, OneWindow, NoRepair, JumpsAreSpeed, TwoJumps),
+    *(LongMemory, NewOrigin, SixteenBits),
+)
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.__name__)
+def test_the_traces_find_an_error_in_the_limits(motion: type[Motion]) -> None:
+    class Device(Stranger):
+        def __post_init__(self) -> None:
+            super().__post_init__()
+            self._motion = motion(self.period_us)
+
+    assert found_by(Device)
+
+
+IN_CORE = (
+    ("core/dcmp_encoder.c", "greater(lesser(a, b), lesser(greater(a, b), c))", "lesser(a, lesser(b, c))"),
+    ("core/dcmp_encoder.h", "DCMP_JUMP_LIMIT 3u", "DCMP_JUMP_LIMIT 4u"),
+    ("core/dcmp_watchdog.c", "> watchdog->time_us", "> watchdog->time_us + 1000u"),
+)
+
+
+@pytest.mark.parametrize("error", IN_CORE, ids=[old for _, old, _ in IN_CORE])
+def test_the_traces_find_an_error_in_the_core(
+    error: tuple[str, str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, old, new = error
+    root = tmp_path / "firmware"
+    shutil.copytree(build.sources(), root)
+    text = (root / file).read_text()
+    assert text.count(old) == 1
+    (root / file).write_text(text.replace(old, new))
+    monkeypatch.setattr(build, "_PLACES", (root,))
+    monkeypatch.setattr(build, "_FLAGS", ("-std=c11", "-O0"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    hostlib.load.cache_clear()
+    try:
+        assert found_by(Firmware)
+    finally:
+        hostlib.load.cache_clear()
