@@ -93,6 +93,7 @@ SEEDED = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("error", SEEDED, ids=str)
 def test_search_finds_a_seeded_error(error: str) -> None:
     assert search(SEEDED[error])[1] is not None
@@ -105,6 +106,7 @@ STUCK = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("error", STUCK, ids=str)
 def test_search_finds_a_state_without_a_way_to_run(error: str) -> None:
     model = STUCK[error]

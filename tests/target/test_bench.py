@@ -86,6 +86,7 @@ def test_closed_loop_through_python_can_and_pyserial(f405: Path, way: str) -> No
     assert system.misuse == []
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(3))
 def test_interrupts_anywhere_change_nothing(f405: Path, seed: int) -> None:
     with rung(f405, "cobs", preempt=seed) as target:

@@ -39,6 +39,7 @@ def test_silence_is_0_V_after_the_watchdog_and_a_tick(f405: Path, carrier: str) 
     assert WATCHDOG_US < off - last <= WATCHDOG_US + TICK_US + 500.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("lsi_hz", [17_000.0, 32_000.0, 47_000.0])
 @pytest.mark.parametrize("stuck", ["tick", "link", "main"])
 def test_stuck_task_is_reset_by_the_chips_own_watchdog(f405: Path, stuck: str, lsi_hz: float) -> None:

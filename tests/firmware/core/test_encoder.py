@@ -189,6 +189,7 @@ def test_the_first_cause_of_a_tick(core: Core) -> None:
     assert _tick(bench, 60) == OVER_SPEED
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("period", [1000, 100])
 @pytest.mark.parametrize("speed", [0, 32_700, -32_700])
 def test_one_wrong_count_of_any_size_does_not_show(core: Core, period: int, speed: int) -> None:
