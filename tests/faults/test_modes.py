@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OFFSET = "plant.offset:V=0.1,at=0.2s"
 SLOW = "host.slow:ms=1,at=0.2s,times=5"
-DROP = "wire.drop:p=0.1,at=0.2s,for=0.2s"
+DROP = "wire.drop:p=1,way=down,at=0.3s,for=1ms"  # one SAMPLE: too few for a warning
 STOP = "firmware.stop:at=0.3s"
 WIRED = "warning: backend.kind = sim has no wire, and a fault needs one: this run has backend.kind=sim-board."
 
