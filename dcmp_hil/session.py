@@ -224,7 +224,7 @@ class Session:
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.link.finish(recorder.t)
-            if end == _AT_ZERO:
+            if not why:
                 self._tell_how_device_ended()
             recorder.event(Event(recorder.t, *end))
             recorder.close()

@@ -294,6 +294,7 @@ class DeviceBackend:
             caller.say(Stop(StopReason.SUPERVISOR))
         goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms)
         self.device_end = goodbye.run(answered=self._answered == self._tick)
+        self._meter.take_health(caller.health)
         if self.device_end is None:
             caller.say(Stop(StopReason.NO_SAMPLE))
             raise refusals.not_confirmed(self._link.name, self._ttl_ms)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.faults import name_of
-from dcmp_hil.wire.messages import Drive, State
+from dcmp_hil.values import Fault
+from dcmp_hil.wire.messages import Drive, Health, State
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 _LEAST = 3  # answers at 0 V
 _PATIENCE_NS = 250_000_000
+_HEALTH_NS = 120_000_000  # HEALTH comes every 100 ms
+_OF_THE_LINK = (Fault.HOST_SILENT, Fault.LINK_DOWN, Fault.CORRUPT_LINK)
 _AT_REST = (State.BOOT, State.IDLE, State.FAULT)
 
 
@@ -63,10 +66,20 @@ class Goodbye:
             confirmed = sample.state in _AT_REST and sample.voltage_mV == 0
             if confirmed and said >= _LEAST:
                 self._say(release=True)
+                self._hear_health(sample)
                 return DeviceEnd(State(sample.state).name, self._fault_of(sample))
             self._say(release=False)
             said += 1
         return None
+
+    def _hear_health(self, sample: SampleReport) -> None:
+        """Wait for the counters of a device that the link has brought to a fault: they show why."""
+        if sample.state != State.FAULT or sample.fault_class not in _OF_THE_LINK:
+            return
+        until_ns = self._clock.now_ns() + _HEALTH_NS
+        while (left_ns := until_ns - self._clock.now_ns()) > 0:
+            if isinstance(self._caller.hear(1e-9 * left_ns), Health):
+                return
 
     def _fault_of(self, sample: SampleReport) -> str:
         if sample.state != State.FAULT:

@@ -66,9 +66,9 @@ class LinkMeter:
         """Take when the command went out, ns: one that took a period comes too late."""
         self.counts.late += now_ns - self._heard_ns > self._late_ns
 
-    def take_health(self, health: Health) -> None:
-        """Keep a HEALTH."""
-        self.health = health
+    def take_health(self, health: Health | None) -> None:
+        """Keep a HEALTH, if there is one."""
+        self.health = health or self.health
         if self._first_health is None:
             self._first_health = health
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 HEALTH_END = 255
 """Where the counters of HEALTH stop."""
 _FEWEST = 10  # events that make a share worth a warning
+_FEW, _LARGE = 3, 0.05  # of a large share of the periods, as in a run that ended soon, fewer do
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,8 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
     counters
         Of a run, or of a part of it.
     most
-        Share of the periods above which losses and damage are told; fewer than ten are never told.
+        Share of the periods above which losses and damage are told; ten at least, or three where that is more
+        than 5 % of the periods.
     most_clock
         Share by which the device's clock may be off.
     """
@@ -97,7 +99,7 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
     found = [
         Concern(cause, count / periods, text.format(count=count, share=_percent(count / periods)))
         for cause, count, text in _losses(counters)
-        if count >= _FEWEST and count > most * periods
+        if count > most * periods and (count >= _FEWEST or (count >= _FEW and count > _LARGE * periods))
     ]
     device = counters.device
     if device and device.bus_offs:

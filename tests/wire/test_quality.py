@@ -20,7 +20,9 @@ def causes(**counts: int | float | DeviceCounters) -> list[str]:
         ({}, []),
         ({"missed": 600}, ["commands_lost"]),
         ({"missed": 5}, []),
-        ({"samples": 100, "missed": 9}, []),  # fewer than ten say nothing
+        ({"samples": 200, "missed": 9}, []),  # so few say nothing
+        ({"samples": 100, "missed": 9}, ["commands_lost"]),
+        ({"samples": 20, "missed": 2}, []),
         ({"missed": 600, "device": DeviceCounters(crc_errors=590)}, ["commands_damaged"]),
         (
             {"missed": 600, "device": DeviceCounters(crc_errors=255, full=("crc_errors",))},
