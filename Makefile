@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults mutants firmware bench encoders lock lockcheck clean
+.PHONY: help run test check pytest faults mutants firmware bench encoders numbers lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -65,6 +65,9 @@ mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/f
 
 firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes
 	@$(BIN)/python -m tools.artefact
+
+numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulated arm leaves its limits
+	@$(BIN)/python -m tools.typed_numbers $(ARGS)
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)

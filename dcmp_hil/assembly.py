@@ -156,11 +156,15 @@ def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
     if limits.monitors != "all":
         return Limits(voltage=amplifier.limit, period=rig.period, notify=notify)
     position, velocity = limits.reference_limits
+    acceleration, braking = rig.reference_accelerations
     return Limits(
         voltage=amplifier.limit,
         slew=amplifier.slew,
         position=position,
         velocity=velocity,
+        acceleration=acceleration,
+        braking=braking,
+        strongest=rig.model.ku_rad_s2_V * amplifier.limit,
         error=limits.error_limit,
         period=rig.period,
         notify=notify,

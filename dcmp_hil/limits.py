@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import TripError
+from dcmp_hil.governor import Bounds, Governor
 from dcmp_hil.values import Event, Reference
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 _SAID_EVERY = 1.0  # s, each limit
 _SATURATED = 0.5  # s in a row at a limit of the voltage that end the run
 _ASTRAY = 0.5  # s in a row that the arm may be too far from the reference: a step takes less
+_SHORTEST = 0.02  # s from rest to the largest velocity
 _IN_A_ROW = 2.5  # periods between two at most
 
 
@@ -43,8 +45,13 @@ class Limits:
         V, either way; infinity for none, as for all of these.
     slew
         V/s.
-    position, velocity
-        rad and rad/s, either way, for the reference: short of where the supervisor would trip.
+    position, velocity, acceleration
+        rad, rad/s and rad/s2, either way, for the reference: short of where the supervisor would trip, and
+        of what the motor can follow.
+    braking
+        rad/s2, that a stop of the reference may reckon with.
+    strongest
+        rad/s2, of the motor at full voltage: which jumps of the reference may be left to the controller.
     error
         rad, by which the measured position may be off the reference for half a second.
     period
@@ -71,10 +78,16 @@ class Limits:
         slew: float = math.inf,
         position: float = math.inf,
         velocity: float = math.inf,
+        acceleration: float = math.inf,
+        braking: float = math.inf,
+        strongest: float = math.inf,
         error: float = math.inf,
     ) -> None:
         self.voltage_limit, self._step = voltage, slew * period
         self._x, self._v, self._error = position, velocity, error
+        self._a = min(acceleration, velocity / _SHORTEST)
+        bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
+        self._governor = Governor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
         self.concern: TripError | None = None
         self._slews = slew < math.inf
@@ -85,11 +98,11 @@ class Limits:
 
     def reference(self, sample: Sample, reference: Reference) -> Reference:
         """Return the reference, or what of it is allowed; NaN stays, and trips as the demand."""
-        x, v, _ = reference
-        error, most = x - sample.position, self._error
-        if -self._x <= x <= self._x and -self._v <= v <= self._v and -most <= error <= most:
+        error, most = reference.position - sample.position, self._error
+        governed = self._governor.bound(sample.t, reference) if self._governor else reference
+        if governed is reference and -most <= error <= most:
             return reference
-        return self._limited_reference(sample, reference)
+        return self._judged(sample, reference, governed)
 
     def voltage(self, t: float, demand: float, last: float) -> float:
         """Return the demand, V, or what of it is allowed after `last` V."""
@@ -102,8 +115,9 @@ class Limits:
         """Return the voltage, or the nearest that the slew allows after `last` V."""
         return max(last - self._step, min(last + self._step, voltage))
 
-    def _limited_reference(self, sample: Sample, reference: Reference) -> Reference:
-        x, v, a = reference
+    def _judged(self, sample: Sample, asked: Reference, reference: Reference) -> Reference:
+        """Say what of a reference is limited; it is the governed one that the arm may not be off."""
+        x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
             self.concern = TripError(
                 "tracking",
@@ -111,13 +125,20 @@ class Limits:
                 f"(reference {x:.2f} rad, position {sample.position:.2f} rad, t = {sample.t:.3f} s).",
                 "Look for an obstacle, and at the reference, the gains and supervisor.error_limit_rad.",
             )
-        if not abs(v) <= self._v:
-            self._say(sample.t, f"reference's velocity limited to {self._v:.4g} rad/s: it asks for {v:.4g}")
-            v, a = math.copysign(self._v, v) if v == v else v, 0.0
+        if reference is not asked:
+            self._say_governed(sample.t, asked)
+        return reference
+
+    def _say_governed(self, t: float, reference: Reference) -> None:
+        x, v, a = reference
         if not abs(x) <= self._x:
-            self._say(sample.t, f"reference limited to {self._x:.4g} rad: it asks for {x:.4g}")
-            return Reference(math.copysign(self._x, x) if x == x else x, 0.0, 0.0)
-        return Reference(x, v, a)
+            self._say(t, f"reference limited to {self._x:.4g} rad: it asks for {x:.4g}")
+        elif not abs(v) <= self._v:
+            self._say(t, f"reference's velocity limited to {self._v:.4g} rad/s: it asks for {v:.4g}")
+        elif not abs(a) <= self._a:
+            self._say(t, f"reference's acceleration limited to {self._a:.4g} rad/s2: it asks for {a:.4g}")
+        else:
+            self._say(t, f"reference's way limited: the arm is led to {x:.4g} rad as the limits allow")
 
     def _limited_voltage(self, t: float, demand: float, last: float) -> float:
         most = self.voltage_limit

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 WATCH = 0.1  # s at 0 V: is the arm at rest
 PUSH = 0.1  # s each way at most
-_PROBE_V, _OVER_FRICTION = 1.0, 2.0  # V; friction that a push must overcome by so much
+_PROBE_V, _GENTLE, _OVER_FRICTION = 1.0, 15.0, 2.0  # V; rad/s2; friction that a push must overcome by so much
 _REST = 0.02  # rad, that the arm may move while it is watched
 _FAR = 0.03  # rad, at which a push ends early: the whole probe stays within 0.1 rad
 _RISEN, _COASTS, _COASTED = 0.9, 3.0, 0.032  # of the voltage; of the mean speed; rad, where a slow push ends
@@ -84,6 +84,8 @@ class Probe:
         (rad/s2)/V, the believed motor gain ku/J.
     voltage
         V, of a push.
+    gravity
+        rad/s2, of the pendulum, as believed.
     count
         rad, one count of the encoder; 0 for an ideal one.
     notify
@@ -96,9 +98,15 @@ class Probe:
     """
 
     def __init__(
-        self, ku: float, voltage: float, count: float, notify: Callable[[Event], None] | None = None
+        self,
+        ku: float,
+        voltage: float,
+        count: float,
+        notify: Callable[[Event], None] | None = None,
+        *,
+        gravity: float = 0.0,
     ) -> None:
-        self._ku, self._voltage, self._count = ku, voltage, count
+        self._ku, self._voltage, self._count, self._gravity = ku, voltage, count, gravity
         self._began = math.nan  # s, of the present stage
         self._x0 = math.nan  # rad, where the arm was as the stage of watching, and then the pushes, began
         self._seen: list[tuple[float, float, float]] = []  # s and rad since the pushes began, V applied
@@ -218,6 +226,7 @@ class Probe:
         noise = math.hypot(_NOISE * self._count, _LEAST)
         usual = np.array([max(self._count, _LEAST), _PUSHED, _STRONGEST * self._ku])
         covariance = np.linalg.inv(columns.T @ columns / noise**2 + np.diag(usual**-2))
+        moved = moved + moved_by(t, self._gravity * np.sin(moved))  # as if it did not fall
         gain = (covariance @ columns.T @ moved)[2] / noise**2
         return float(gain), float(np.sqrt(covariance[2, 2]))
 
@@ -238,6 +247,7 @@ def probe_for(
     notify
         Told of the motor's gain.
     """
-    voltage = min(voltage_limit, max(_PROBE_V, _OVER_FRICTION * model.f1 / model.ku))
-    probe = Probe(model.ku, voltage, count, notify)
+    gentle = min(_PROBE_V, _GENTLE / model.ku)
+    voltage = min(voltage_limit, max(gentle, _OVER_FRICTION * model.f1 / model.ku))
+    probe = Probe(model.ku, voltage, count, notify, gravity=model.gravity)
     return probe if probe.telling else None

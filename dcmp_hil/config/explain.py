@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.config.reach import beyond_reach
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
 from dcmp_hil.config.words import toml_value
@@ -12,8 +13,6 @@ from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
 from dcmp_hil.probe import probe_for
-from dcmp_hil.references.periodic import Chirp, Sine
-from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 _LEAST_DAMPING = 0.5
 _FAR_FROM_RULE = 3.0
-_LOOK_AHEAD = 60.0  # s of a csv reference that are looked at where the run has no end
-_LOOKS = 2000
 
 
 def explain(rig: Rig) -> list[tuple[str, str, str]]:
@@ -66,8 +63,8 @@ def _by_rule(name: str, rig: Rig) -> str:
 
 def warnings(rig: Rig) -> list[str]:
     """Name what is allowed and yet seldom meant."""
-    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start, _reach)
-    return [sentence for rule in rules if (sentence := rule(rig))]
+    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start)
+    return [sentence for rule in rules if (sentence := rule(rig))] + beyond_reach(rig)
 
 
 def _observer(rig: Rig) -> str:
@@ -133,25 +130,3 @@ def _soft_start(rig: Rig) -> str:
     if rig.supervisor.start == "engage" and rig.reference.soft_start_s == 0.0:
         return "reference.soft_start_s = 0: the first command is as large as the first error asks for."
     return ""
-
-
-def _reach(rig: Rig) -> str:
-    limit, _ = rig.supervisor.reference_limits
-    if rig.supervisor.monitors == "finite" or _farthest(rig) <= limit:
-        return ""
-    return f"reference: it leaves supervisor.position_limit_rad and will be held at {limit:.4g} rad."
-
-
-def _farthest(rig: Rig) -> float:
-    """Return how far from hanging the reference goes, rad."""
-    reference = rig.reference
-    if isinstance(reference, Sine | Chirp):
-        return abs(reference.offset_rad) + reference.amplitude_rad
-    if isinstance(reference, Hold):
-        return abs(reference.position_rad)
-    if isinstance(reference, Step):
-        return max(abs(reference.before_rad), abs(reference.after_rad))
-    if isinstance(reference, Trapezoid):
-        return max(abs(reference.low_rad), abs(reference.high_rad))
-    length = rig.run.duration_s or _LOOK_AHEAD
-    return max(abs(reference.at(length * k / _LOOKS).position) for k in range(_LOOKS + 1))

@@ -33,6 +33,7 @@ from dcmp_hil.section import Section
 if TYPE_CHECKING:
     from dcmp_hil.model import Model
 
+_OF_ALL, _OF_SPARE, _OF_MOTOR = 0.85, 0.7, 0.25  # of all the motor has; of what is left; at least, of all
 _COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there
 
 
@@ -133,6 +134,17 @@ class Rig(Section):
         if self.sim.step_us == "auto":
             return math.ceil(self.period / _COARSEST_STEP - 1e-9)
         return max(1, round(self.period / (self.sim.step_us * 1e-6)))
+
+    @property
+    def reference_accelerations(self) -> tuple[float, float]:
+        """What a reference may ask for, and what a stop may reckon with, rad/s2; infinite without a limit.
+
+        Gravity helps at the ends of a swing; a stop has it against itself. Both leave the controller room.
+        """
+        model, motor = self.model, self.model.ku_rad_s2_V * self.amplifier.limit
+        pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
+        spare = max(_OF_SPARE * (motor - pushed - model.gravity_rad_s2), _OF_MOTOR * motor)
+        return max(_OF_ALL * motor - pushed, spare), spare
 
     @property
     def impossible_on_a_wire(self) -> list[str]:

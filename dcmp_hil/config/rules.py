@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.config.loop_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.config.words import number
 from dcmp_hil.observers.super_twisting import bandwidth_floor
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from dcmp_hil.section import Section
 
 _COARSEST_ENCODER = 256  # counts a revolution
+_LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
+_HELD = 0.95  # of the motor's torque
 _LEAST = 1e-6  # of any key that must be above 0
 _REASON = {  # by unit: the largest that anybody may mean
     "1_s": 1e5,
@@ -110,6 +113,38 @@ def _encoder_shows_faults(rig: Rig) -> str:
     )
 
 
+def _limits_leave_room(rig: Rig) -> str:
+    """Refuse limits that the start alone would pass: the probe's two pushes, and an arm that swings back."""
+    limits = rig.supervisor
+    if limits.monitors != "all":
+        return ""
+    faults = []
+    if limits.position_limit_rad < _LEAST_TRAVEL:
+        faults.append(
+            f"supervisor.position_limit_rad: got {number(limits.position_limit_rad)}; at least "
+            f"{number(_LEAST_TRAVEL)} rad: the probe before the start moves the arm by up to 0.1 rad."
+        )
+    if limits.velocity_limit_rad_s < _LEAST_SPEED:
+        faults.append(
+            f"supervisor.velocity_limit_rad_s: got {number(limits.velocity_limit_rad_s)}; at least "
+            f"{number(_LEAST_SPEED)} rad/s: the probe before the start moves the arm at up to 1 rad/s."
+        )
+    return "\n".join(faults)
+
+
+def _motor_holds(rig: Rig) -> str:
+    """Refuse a motor that what pushes all the time carries away."""
+    model, motor = rig.model, rig.model.ku_rad_s2_V * rig.amplifier.limit
+    pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
+    if rig.supervisor.monitors != "all" or pushed <= max(model.f1_rad_s2, _HELD * motor):
+        return ""
+    return (
+        f"model.eta_rad_s2: got {number(model.eta_rad_s2)}; with model.eta_amplitude_rad_s2 a push of up to "
+        f"{pushed:.4g} rad/s2, and the motor has {motor:.4g} at amplifier.voltage_limit_V: nothing would "
+        "hold the arm. Check the three, and model.ku_rad_s2_V."
+    )
+
+
 def _within_reason(rig: Rig) -> str:
     """Refuse what only a wrong unit explains, in the tables that do not say how large their keys may be."""
     sections: dict[str, Section] = {
@@ -157,5 +192,8 @@ RULES: tuple[Callable[[Rig], str], ...] = (
     _whole_units,
     _link_carries_rate,
     _encoder_shows_faults,
+    _limits_leave_room,
+    _motor_holds,
+    gains_hold,
 )
 """Each returns its faults, one a line, beginning with the key; empty if there is none."""

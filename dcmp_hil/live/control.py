@@ -19,7 +19,7 @@ from dcmp_hil.errors import DcmpError
 from dcmp_hil.live.knobs import knobs
 from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, Mailbox
 from dcmp_hil.live.places import peer_of, socket_of
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.settable import changed, doubts
 from dcmp_hil.live.state import state_of
 from dcmp_hil.telemetry.ring import Ring, capacity_of
 from dcmp_hil.telemetry.shared import mapped
@@ -140,8 +140,10 @@ class Server:
         if answer.what != APPLIED:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
             return {"ok": False, "said": f"The run did not take it: {why}."}
+        doubtful = doubts(self._rig, rig)
         self._rig, self._knobs = rig, knobs(rig)
-        return {"ok": True, "said": f"{change.words}, applied at {answer.t:.3f} s", "t": answer.t}
+        said = [f"{change.words}, applied at {answer.t:.3f} s", *(f"warning: {one}" for one in doubtful)]
+        return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
 
     async def _hand_on(self, number: int) -> Answer | None:
         for _ in range(round(_ANSWER / _LOOK)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.rules import within_reason
 from dcmp_hil.config.units import in_words, split_unit
-from dcmp_hil.live.settable import settable, value_of
+from dcmp_hil.live.settable import allowed, settable, value_of
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -29,6 +29,8 @@ _SLIDERS = {  # from, to; both above 0: by decades
     "at_s": (0.0, 60.0),
     "rest_s": (0.0, 10.0),
 }
+_HALVINGS, _NEAR = 12, 1e-3  # of the search; of a value, the nearest that is tried
+_FARTHEST = 1e9  # of a key without a bound
 _ANGLES = (-3.0, 3.0)
 _SLOWEST = 5.0  # rad/s, of the slider for mu0
 _NO_KIND = ("custom", "csv")
@@ -55,6 +57,8 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
     if name == "mu0_rad_s":
         high = min(high, 0.3 / rig.period)
         start, end = _SLOWEST, high
+    low, high = _end(rig, key, value, low), _end(rig, key, value, high)
+    start, end = max(start, low), min(end, high)
     return {
         "key": key,
         "value": value,
@@ -65,3 +69,27 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
         "slider": [min(start, value) if value > 0.0 or start <= 0.0 else start, max(end, value)],
         "decades": start > 0.0 and math.isfinite(end),
     }
+
+
+def _end(rig: Rig, key: str, value: float, bound: float) -> float:
+    """Return how far a number may go from its value towards a bound: as far as a change would be taken."""
+    far = min(max(bound, -_FARTHEST), _FARTHEST)
+    if allowed(rig, key, far):
+        return bound
+    way = math.copysign(1.0, far - value)
+    near = _NEAR * max(abs(value), 1.0)
+    if abs(far - value) <= near or not allowed(rig, key, value + way * near):
+        return value
+    inside, outside = math.log(near), math.log(abs(far - value))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        fits = allowed(rig, key, value + way * math.exp(middle))
+        inside, outside = (middle, outside) if fits else (inside, middle)
+    return _rounded(value + way * math.exp(inside), value)
+
+
+def _rounded(end: float, value: float) -> float:
+    """Round to three digits towards the value: what the panel shows is what it takes."""
+    digit = 10.0 ** (math.floor(math.log10(abs(end))) - 2) if end else 1.0
+    rounded = float(f"{(math.floor if end > value else math.ceil)(end / digit) * digit:.12g}")
+    return rounded if (rounded - value) * (end - value) > 0.0 else end

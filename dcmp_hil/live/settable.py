@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import observers
 from dcmp_hil.config import change_rig
+from dcmp_hil.config.explain import warnings
+from dcmp_hil.config.loop_rules import holds
+from dcmp_hil.config.reach import beyond_reach
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
@@ -81,7 +84,25 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
         raise ConfigError(
             "A class of your own takes the place of no other in a run. Start another run with it."
         )
+    if after.reference != rig.reference and (faults := beyond_reach(after)):
+        raise ConfigError(*faults)
     return after, _worked_out(rig, after)
+
+
+def doubts(before: Rig, after: Rig) -> list[str]:
+    """Name what a change makes questionable, in the words that `run` has for it."""
+    known = warnings(before)
+    return [sentence for sentence in warnings(after) if sentence not in known]
+
+
+def allowed(rig: Rig, key: str, value: float) -> bool:
+    """Return whether `changed` would take a number of a key, its bounds by the schema aside."""
+    table, name = key.split(".")
+    section = getattr(rig, table)
+    after = rig.model_copy(update={table: section.model_copy(update={name: value})})
+    if table == "reference":
+        return not beyond_reach(after)
+    return holds(after)
 
 
 def _refuse(rig: Rig, keys: list[str]) -> None:

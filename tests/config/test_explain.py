@@ -41,7 +41,7 @@ def test_shipped_rigs_have_no_warnings() -> None:
         (["observer.kind=paper"], "super_twisting"),
         (["observer.mu0_rad_s=0"], "runs away"),
         (["observer.mu0_rad_s=5"], "far from the rule's 40 rad/s"),
-        (["controller.kd_1_s=10"], "will ring"),
+        (["controller.kd_1_s=50"], "will ring"),
         (["reference.soft_start_s=0"], "first command"),
         (["reference.amplitude_rad=7"], "will be held"),
         (["reference.kind=hold", "reference.position_rad=-7"], "will be held"),

@@ -33,7 +33,7 @@ def _run(*overrides: str, fault: str = "") -> tuple[Session, Board, Exception]:
 @pytest.mark.parametrize(
     ("overrides", "fault", "reason"),
     [
-        (("reference.rate_rad_s=8", "amplifier.voltage_limit_V=4"), "", "saturation"),
+        (("amplifier.voltage_limit_V=4", "sim.plant.gravity_rad_s2=40"), "", "saturation"),
         (("reference.rate_rad_s=4", "supervisor.error_limit_rad=0.001"), "", "tracking"),
         (("timing.overrun=stop",), "host.slow:ms=2,at=1.5s", "late"),
     ],

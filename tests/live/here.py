@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.change import Change
 from dcmp_hil.live.mailbox import Answer, Mailbox
 from dcmp_hil.live.settable import changed
@@ -40,6 +41,8 @@ class ChangedRun:
         By the number of the sample before which it is put: overrides, or a change as it is.
     overrides
         Of the bench rig.
+    refusals
+        Whether a change may be refused.
     """
 
     def __init__(
@@ -47,12 +50,13 @@ class ChangedRun:
         script: Mapping[int, Sequence[str] | Change],
         *overrides: str,
         duration: float = 5.0,
+        refusals: bool = False,
         **session: Any,
     ) -> None:
         self.control = Here()
         self.answers: list[Answer | None] = []
         self._numbers: list[int] = []
-        self._script = script
+        self._script, self._refusals = script, refusals
         self.held = HeldRun(
             *overrides, duration=duration, on_read=self._read, control=self.control, **session
         )
@@ -60,8 +64,14 @@ class ChangedRun:
 
     def _read(self, k: int, sample: Sample) -> Sample:
         wanted = self._script.get(k)
-        if wanted is not None:
+        if wanted is None:
+            return sample
+        try:
             change = wanted if isinstance(wanted, Change) else self._checked(wanted)
+        except ConfigError:
+            if not self._refusals:
+                raise
+        else:
             self._numbers.append(self.control.mailbox.put(change))
         return sample
 

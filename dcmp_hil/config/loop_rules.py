@@ -1,0 +1,89 @@
+"""Whether the loop of a rig is stable, and what one count of its encoder costs: rules for gains."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dcmp_hil.config.words import number
+from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.observers import ObserverContext
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.stability import LinearLoop, LoopSpec, bandwidths
+
+if TYPE_CHECKING:
+    from dcmp_hil.config.rig import Rig
+
+_LEAST, _MOST = 0.8, 1.25  # times the believed motor gain, between which the loop must be stable
+_QUIET = 0.25  # of the voltage limit, that the encoder's count alone may cost (standard deviation)
+_BLAMED = (
+    ("loop", "rate_hz"),
+    ("controller", "kp_1_s2"),
+    ("controller", "kd_1_s"),
+    ("observer", "L1_1_s"),
+    ("observer", "L2_1_s2"),
+    ("observer", "M_rad_s3"),
+    ("observer", "mu0_rad_s"),
+)
+
+
+def gains_hold(rig: Rig) -> str:
+    """Refuse gains with which the loop runs away, or shakes the motor with the encoder's own steps."""
+    fault = _fault(rig)
+    return f"{_blamed(rig)} {fault}" if fault else ""
+
+
+def holds(rig: Rig) -> bool:
+    """Return whether `gains_hold` finds nothing wrong."""
+    return not _fault(rig)
+
+
+def loops(rig: Rig) -> list[LinearLoop]:
+    """Return the linear loop at every bandwidth that the observer has; empty for classes of one's own."""
+    if not (isinstance(rig.controller, PdSettings) and isinstance(rig.observer, SuperTwistingSettings)):
+        return []
+    model, count = rig.model.values(), rig.encoder.count
+    spec = LoopSpec(model, rig.period, rig.loop.delay_samples, rig.controller.position == "measured", count)
+    tuning = rig.observer.tuning(ObserverContext(model, rig.period, rig.encoder.counts))
+    return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
+
+
+def _fault(rig: Rig) -> str:
+    if rig.supervisor.monitors != "all":
+        return ""
+    for loop in loops(rig):
+        if not (loop.stable() and loop.stable(_LEAST) and loop.stable(_MOST)):
+            return _unstable(loop)
+        noise, _ = loop.noise_V()
+        if math.isfinite(rig.amplifier.limit) and noise > _QUIET * rig.amplifier.limit:
+            return (
+                f"with these gains the encoder's steps alone make the voltage shake by {noise:.2g} V "
+                f"(standard deviation); at most {_QUIET * rig.amplifier.limit:.3g} V, a quarter of "
+                "amplifier.voltage_limit_V. Lower controller.kd_1_s, observer.mu0_rad_s or observer.M_rad_s3."
+            )
+    return ""
+
+
+def _unstable(loop: LinearLoop) -> str:
+    margins = loop.margins()
+    needed = f"{number(_LEAST)} to {number(_MOST)} times model.ku_rad_s2_V are needed"
+    remedy = "Leave out the gains that were changed to get those that fit, or raise loop.rate_hz."
+    if margins is None:
+        return f"the loop is not stable with these gains, whatever the motor's: {needed}. {remedy}"
+    return (
+        f"the loop is stable for motor gains of {margins.low:.2f} to {margins.high:.2f} times "
+        f"model.ku_rad_s2_V only; {needed}. {remedy}"
+    )
+
+
+def _blamed(rig: Rig) -> str:
+    """Find the key that alone makes the difference; else name the proportional gain."""
+    for table, name in _BLAMED:
+        section = getattr(rig, table)
+        if name not in section.model_fields_set:
+            continue
+        default = type(section).model_fields[name].default
+        usual = rig.model_copy(update={table: section.model_copy(update={name: default})})
+        if not _fault(usual):
+            return f"{table}.{name}: got {number(getattr(section, name))};"
+    return "controller.kp_1_s2:"

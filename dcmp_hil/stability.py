@@ -1,0 +1,183 @@
+"""The exact loop as a matrix: plant, delay, observer, predictor and controller of one period, linear.
+
+The plant is held-input exact, its command acts one sample late, the observer is `super_twisting` with its
+gains at a fixed bandwidth and is fed the voltage applied. What stays out is what is not linear: Coulomb
+friction, gravity, saturation, the encoder's steps and the sliding term, which raises the bandwidth while the
+innovation is small; `bandwidths` says how far.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dcmp_hil.observers.matched import luenberger_copy, matched_gains
+from dcmp_hil.predictor import held_input
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dcmp_hil.controllers import Gains
+    from dcmp_hil.model import Model
+    from dcmp_hil.observers.super_twisting import Tuning
+
+    Matrix = NDArray[np.float64]
+
+_STATES = 11
+_P, _V, _APPLIED, _SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, _NOISE = range(_STATES)
+_GROWTH = 0.1  # 1/s: what grows more slowly than that is a drift
+_SLIDING = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
+_FARTHEST, _PER_DECADE, _HALVINGS = 1.0, 12, 12  # decades of gain that are searched, steps, refinements
+_DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
+
+
+class LoopSpec(NamedTuple):
+    """All that the linear loop depends on.
+
+    Parameters
+    ----------
+    model
+        What observer and controller believe, and the plant is.
+    period
+        s.
+    delay_samples
+        0 or 1.
+    measured
+        Whether the controller is given the encoder's position.
+    resolution
+        rad, one count of the encoder; 0 for an ideal one.
+    """
+
+    model: Model
+    period: float
+    delay_samples: int
+    measured: bool
+    resolution: float
+
+
+class Margins(NamedTuple):
+    """Between which gains of the motor, as a multiple of the believed one, the loop is stable."""
+
+    low: float
+    high: float
+
+
+class LinearLoop:
+    """The loop of one rig with one set of gains.
+
+    Parameters
+    ----------
+    spec
+        Of the rig.
+    gains
+        Of the controller.
+    tuning
+        Of the observer.
+    bandwidth
+        rad/s, of the differentiator.
+    """
+
+    def __init__(self, spec: LoopSpec, gains: Gains, tuning: Tuning, bandwidth: float) -> None:
+        self._spec, self._gains, self._tuning = spec, gains, tuning
+        step = spec.period
+        self._copy = luenberger_copy(step, spec.model.f0, tuning.L1, tuning.L2)
+        k1, k2, k3 = matched_gains(bandwidth * step)
+        self._correction = (k1, k2 / step, k3 / (step * step))
+        self._held = held_input(spec.model.f0, step)
+
+    def matrix(self, motor: float = 1.0) -> Matrix:
+        """Return what one period does to the state, with a motor so many times as strong as believed."""
+        return self._period(np.eye(_STATES), motor)
+
+    def radius(self, motor: float = 1.0) -> float:
+        """Return the largest magnitude of an eigenvalue; infinity where there is none."""
+        matrix = self.matrix(motor)[:_NOISE, :_NOISE]
+        if not np.isfinite(matrix).all():
+            return math.inf
+        return float(np.abs(np.linalg.eigvals(matrix)).max())
+
+    def stable(self, motor: float = 1.0) -> bool:
+        """Return whether nothing grows faster than a drift."""
+        return self.radius(motor) < math.exp(_GROWTH * self._spec.period)
+
+    def margins(self) -> Margins | None:
+        """Return the gains of the motor between which the loop is stable; None if it is not at 1."""
+        if not self.stable():
+            return None
+        return Margins(self._edge(-1.0), self._edge(1.0))
+
+    def noise_V(self) -> tuple[float, float]:
+        """Return the standard deviations of voltage and of its change in a period that a count costs, V."""
+        matrix = self.matrix()
+        loop, drive = matrix[:_NOISE, :_NOISE], matrix[:_NOISE, _NOISE]
+        with np.errstate(all="ignore"):
+            power, spread = loop.copy(), np.outer(drive, drive)
+            for _ in range(_DOUBLINGS):
+                spread = spread + power @ spread @ power.T
+                power = power @ power
+        if not np.isfinite(spread).all():
+            return math.inf, math.inf
+        noise = self._spec.resolution / math.sqrt(12.0)
+        now = spread[_SENT, _SENT]
+        next_ = loop[_SENT] @ spread @ loop[_SENT] + drive[_SENT] ** 2
+        both = loop[_SENT] @ spread[:, _SENT]
+        change = max(0.0, now + next_ - 2.0 * both)
+        return noise * math.sqrt(max(0.0, now)), noise * math.sqrt(change)
+
+    def _edge(self, way: float) -> float:
+        """Search for the end of stability upwards or downwards from 1."""
+        inside, step = 0.0, way * _FARTHEST / _PER_DECADE
+        for k in range(1, _PER_DECADE + 1):
+            if not self.stable(10.0 ** (k * step)):
+                outside = k * step
+                break
+            inside = k * step
+        else:
+            return float(10.0**inside)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if self.stable(10.0**middle) else (inside, middle)
+        return float(10.0**inside)
+
+    def _period(self, s: Matrix, motor: float) -> Matrix:
+        """Carry states (as rows of `s`) over one period: the line of the loop, and then the plant."""
+        model, step, tuning = self._spec.model, self._spec.period, self._tuning
+        f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12 = self._copy
+        k1, k2, k3 = self._correction
+        y, u = s[_P] + s[_NOISE], model.ku * s[_APPLIED]
+        z1 = f11 * s[_Z1] + f12 * s[_Z2] + gu1 * u + h01 * s[_Y] + h11 * y
+        z2 = f21 * s[_Z1] + f22 * s[_Z2] + gu2 * u + h02 * s[_Y] + h12 * y
+        v1, v2, v3 = s[_V1] + step * (s[_V2] + 0.5 * step * s[_V3]), s[_V2] + step * s[_V3], s[_V3]
+        b = y - z1 - v1
+        v1, v2, v3 = v1 + k1 * b, v2 + k2 * b, v3 + k3 * b
+        L1, L2, f0 = tuning.L1, tuning.L2, model.f0
+        x1, x2 = z1 + v1, z2 + v2 + L1 * v1
+        w = v3 + (L1 + f0) * v2 + (L2 + f0 * L1) * v1
+        voltage = self._voltage(y if self._spec.measured else x1, x2, w, s[_SENT])
+        applied = s[_SENT] if self._spec.delay_samples else voltage
+        a, p1, p2 = self._held
+        drive = motor * model.ku * applied
+        after = np.zeros_like(s)
+        after[_P], after[_V] = s[_P] + p1 * s[_V] + p2 * drive, a * s[_V] + p1 * drive
+        after[_APPLIED], after[_SENT], after[_Y] = applied, voltage, y
+        after[_Z1], after[_Z2], after[_V1], after[_V2], after[_V3] = z1, z2, v1, v2, v3
+        return after
+
+    def _voltage(self, x1: Matrix, x2: Matrix, w: Matrix, sent: Matrix) -> Matrix:
+        model, (kp, kd, compensation) = self._spec.model, self._gains
+        if self._spec.delay_samples:
+            a, p1, p2 = self._held
+            drive = w + model.ku * sent
+            x1, x2 = x1 + p1 * x2 + p2 * drive, a * x2 + p1 * drive
+        volts: Matrix = (-compensation * w - kp * x1 - kd * x2 + model.f0 * x2) / model.ku
+        return volts
+
+
+def bandwidths(tuning: Tuning, count: float) -> Sequence[float]:
+    """Return the bandwidths of the differentiator, rad/s: its floor, and the sliding term's at a count."""
+    sliding = (tuning.M / (_SLIDING * count)) ** (1 / 3) if count > 0.0 else 0.0
+    return [mu for mu in (tuning.mu0, sliding) if mu >= max(tuning.mu0, 1e-9)]
