@@ -32,7 +32,7 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         With a sentence for each place that cannot be written, or that another one is already.
     """
     faults: list[str] = []
-    taken = {os.path.realpath(path): f"is {what} itself" for what, path in (inputs or {}).items()}
+    taken = {_real(path): f"is {what} itself" for what, path in (inputs or {}).items()}
     for option, path in places.items():
         if path is None:
             continue
@@ -40,7 +40,7 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         if reason:
             faults.append(f"{option} {path}: {reason}. {_REMEDY}")
             continue
-        place = os.path.realpath(path)
+        place = _real(path)
         if place in taken:
             faults.append(f"{option} {path}: {taken[place]}. Write elsewhere.")
         if not _is_special(path):
@@ -57,7 +57,7 @@ def try_folder(option: str, folder: Path) -> None:
     ConfigError
         If not.
     """
-    place = Path(os.path.realpath(folder))
+    place = _real(folder)
     try:
         while not place.exists():
             place = place.parent
@@ -100,7 +100,7 @@ def place_beside(path: Path) -> Path | None:
 
     None where that cannot be: for a device or a pipe, or a folder in which no file can be made.
     """
-    place = Path(os.path.realpath(path))
+    place = _real(path)
     if _is_special(path) or not os.access(place.parent, os.W_OK | os.X_OK):
         return None
     return place.with_name(f".{os.getpid()}{place.suffix[:_SUFFIX]}.part")
@@ -118,7 +118,7 @@ def write_text(path: Path, text: str) -> None:
     if beside is None:
         path.write_text(text, encoding="utf-8")
         return
-    place = Path(os.path.realpath(path))
+    place = _real(path)
     try:
         beside.write_text(text, encoding="utf-8")
         if place.exists():
@@ -134,7 +134,7 @@ def _fault(path: Path) -> str:
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
-        return _fault_of_folder(Path(os.path.realpath(path)).parent)
+        return _fault_of_folder(_real(path).parent)
     except (OSError, ValueError) as error:  # ValueError: a NUL
         return _words(error)
     if stat.S_ISDIR(mode):
@@ -152,6 +152,14 @@ def _fault_of_folder(folder: Path) -> str:
     if not stat.S_ISDIR(mode):
         return f"{folder} is no folder"
     return "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} may not be written"
+
+
+def _real(path: Path) -> Path:
+    """Return where links lead; the path itself where the current folder is gone."""
+    try:
+        return Path(os.path.realpath(path))
+    except (OSError, ValueError):
+        return path
 
 
 def _is_special(path: Path) -> bool:

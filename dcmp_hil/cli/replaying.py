@@ -45,6 +45,9 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
     """
     csv, rrd = _targets(file, outputs)
     result = replay(read_recording(file, columns), settings)
+    if rrd is not None and outputs.rrd is None and (reason := _no_library()):
+        console.warn(f"no {rrd}: {reason}")
+        rrd = None
     json = json_place(outputs.json)
     written, faults = write_each(
         [
@@ -59,6 +62,15 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
             console.note(f"wrote {path}")
     if faults:
         raise ConfigError(*faults)
+
+
+def _no_library() -> str:
+    """Return why the library of Rerun does not load here; nothing if it does."""
+    try:
+        import dcmp_hil.telemetry.series  # noqa: F401
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 def _show(file: Path, settings: ReplaySettings, result: ReplayResult, outputs: Outputs) -> None:

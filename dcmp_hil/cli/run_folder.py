@@ -90,6 +90,8 @@ class RunFolder:
 
     def tell(self, record: Path | None, *, live: bool) -> None:
         """Say where things are and how to look at them."""
+        if not self.path.exists():  # a warning has said so
+            return
         console.note(f"kept in {self.path}/")
         recording = record or self.recording
         if not live and recording.exists():
@@ -138,5 +140,7 @@ def _viewer_command() -> str:
     beside = Path(sys.executable).with_name("rerun")
     if shutil.which("rerun") or not beside.exists():
         return "rerun"
-    here = Path.cwd()
-    return str(beside.relative_to(here) if beside.is_relative_to(here) else beside)
+    try:
+        return str(beside.relative_to(Path.cwd()))
+    except (OSError, ValueError):  # the current folder is gone, or another one
+        return str(beside)
