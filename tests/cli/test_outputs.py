@@ -142,6 +142,23 @@ def test_command_refuses_a_place_before_it_works(
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
 
 
+def test_current_folder_that_is_gone_is_told_in_a_line(installed: Path, tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    line = 'rmdir ../gone && exec "$0" run --fast --duration 1 --json x.json'
+    done = subprocess.run(
+        ["sh", "-c", line, str(installed)],
+        cwd=tmp_path / "gone",
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=BOUND,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+
+
 def test_trip_stays_the_end_of_a_run_whose_json_cannot_be_written(installed: Path, tmp_path: Path) -> None:
     (tmp_path / "place").mkdir()
     command = [str(installed), "run", "--duration", "6", "--viewer", "none", "--json", "place/x.json"]
