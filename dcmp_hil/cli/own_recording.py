@@ -72,6 +72,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
     run = _read(file)
     if not len(run.rows):
         raise ConfigError(f"{run.path}: no period is in it.")
+    _tell_faults(run)
     keys, start = given.keys(), given.figures.get("start") or 0.0
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
@@ -104,6 +105,15 @@ def _read(file: Path) -> RecordedRun:
         last = f"{run.rows[-1, 0]:.3f} s" if len(run.rows) else "its beginning"
         console.warn(f"{run.path} was cut off: it ends at {last}, and what is there is right.")
     return run
+
+
+def _tell_faults(run: RecordedRun) -> None:
+    """Warn where the run was told to go wrong in observer or controller, which are sound here."""
+    if '"host.' in run.run.get("faults", ""):
+        console.warn(
+            f"{run.path} had faults of the host on purpose. Here observer and controller have none: the "
+            "numbers may differ from where a fault began."
+        )
 
 
 def _changed(rig: Rig, overrides: Sequence[str]) -> Rig | None:

@@ -55,6 +55,19 @@ def test_a_run_keeps_what_went_wrong_on_purpose(cli: Cli, tmp_path: Path) -> Non
     assert json.loads((folder / "summary.json").read_text())["faults"] == ["plant.offset:V=0.1,at=0.5s"]
 
 
+@pytest.mark.parametrize(
+    ("fault", "told"), [("host.diverge:at=0.5s,for=5ms", True), ("plant.offset:V=0.1,at=0.5s", False)]
+)
+def test_replay_says_that_faults_of_the_host_are_not_made_again(
+    cli: Cli, tmp_path: Path, fault: str, told: bool
+) -> None:
+    cli("run", "--fast", "--duration", "0.7", "--fault", fault)
+    (folder,) = (tmp_path / "runs").iterdir()
+    again = cli("replay", str(folder))
+    assert ("had faults of the host on purpose" in " ".join(again.err.split())) == told
+    assert ("the numbers differ" in " ".join(again.out.split())) == told
+
+
 def test_a_fault_of_the_wire_brings_its_wire_along(cli: Cli) -> None:
     outcome = cli(
         "run", "bench-1khz", "--fast", "--no-record", "--duration", "1.5", "--fault", "wire.hold:way=up,at=1s"
