@@ -161,7 +161,8 @@ def _confirm(*, yes: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise ConfigError("--arm: there is no terminal to confirm at. Add --yes if the motor may move.")
-    if not typer.confirm("May the motor move?", err=True):
+    console.err.print(Text("May the motor move? [y/N] "), end="")
+    if sys.stdin.readline().strip().lower() not in {"y", "yes"}:
         raise ConfigError("--arm: not confirmed, nothing was sent. Without --arm the motor stays off.")
 
 

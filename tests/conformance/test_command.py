@@ -14,10 +14,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.conformance.check import Verdict
+from dcmp_hil.conformance.client import Client
+from dcmp_hil.conformance.opening import open_line
 from dcmp_hil.conformance.registry import CHECKS
+from dcmp_hil.conformance.runner import run_checks
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.conformance.seeded import SEEDS
-from tests.contract.pump import PtyPort
+from tests.contract.pump import PtyPort, Pump, VirtualBus
+from tests.contract.stranger import Stranger
 from tests.firmware.core_library import compiler
 from tests.helpers import bench
 from tests.installed import environment
@@ -195,3 +200,56 @@ def test_the_checks_are_listed(script: Script) -> None:
     done = script("conform", "--list")
     assert (done.code, done.err) == (0, "")
     assert [line.split()[0] for line in done.out.splitlines()] == [check.name for check in CHECKS]
+
+
+class Patient(Stranger):
+    """A device whose encoder stands still: what a pump ticks."""
+
+    def tick(self) -> None:  # type: ignore[override]
+        super().tick(0)
+
+
+def test_a_can_bus_is_a_carrier_too() -> None:
+    far = VirtualBus("conform")
+    pump = Pump(Patient(carrier="can"), far)  # type: ignore[arg-type]
+    pump.start()
+    try:
+        line = open_line(
+            "conform", "can", interface="virtual", baud=1, bitrate=1_000_000, node=0, clock=MonotonicClock()
+        )
+        chosen = [
+            check
+            for check in CHECKS
+            if check.name in {"identity", "ownership", "parameters-range", "answers"}
+        ]
+        outcomes = list(run_checks(Client(line, MonotonicClock()), chosen, armed=False, clear=False))
+        line.close()
+    finally:
+        pump.close()
+    assert {one.check.name: one.findings for one in outcomes if one.verdict != Verdict.PASSED} == {}
+    assert len(outcomes) == 4
+
+
+@pytest.mark.parametrize(("answer", "code"), [("n", 2), ("y", 0)])
+def test_a_person_is_asked(installed: Path, tmp_path: Path, answer: str, code: int) -> None:
+    master, slave = os.openpty()
+    try:
+        with virtual_device() as device:
+            os.write(master, f"{answer}\n".encode())
+            done = subprocess.run(
+                [str(installed), "conform", device.port, "--arm", "--only", "arming", "--link", "cobs"],
+                cwd=tmp_path,
+                env=environment(),
+                stdin=slave,
+                capture_output=True,
+                text=True,
+                timeout=BOUND,
+                check=False,
+            )
+            ran = any(output.enable for output in device.log)
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert (done.returncode, ran) == (code, answer == "y")
+    assert "May the motor move? [y/N] " in done.stderr
+    assert done.stdout == ("passed      arming (section 7)\n1 passed\n" if answer == "y" else "")
