@@ -12,11 +12,13 @@ import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+from unittest.mock import patch
 
 from dcmp_hil import load_rig, loop, run
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import SimulatedClock
-from dcmp_hil.observers import ObserverContext
+from dcmp_hil.observers import ObserverContext, super_twisting
+from dcmp_hil.observers.matched import copy_step, luenberger_copy
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Cycle, Sample
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.observers import Observer
+    from dcmp_hil.observers.matched import Copy
 
 _ROUNDS = 7
 
@@ -91,6 +94,17 @@ def _step_us(make: Callable[[], Observer]) -> float:
     return 1e6 * (time.process_time() - began) / len(samples)
 
 
+def _odd_step_us(setting: ObserverContext, copy: Callable[..., Copy]) -> float:
+    """Cost of one step of the default observer where the device's clock is 5 % off, by either way, us."""
+    samples = [Sample(1.05e-3 * k, 1e-3 * (k % 7), 1.0) for k in range(4000)]
+    with patch.object(super_twisting, "copy_step", copy):
+        update = SuperTwisting(setting).update
+        began = time.process_time()
+        for sample in samples:
+            update(sample)
+        return 1e6 * (time.process_time() - began) / len(samples)
+
+
 def _command_s(*arguments: str) -> float:
     began = time.perf_counter()
     subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own
@@ -121,6 +135,13 @@ def _rows() -> list[Row]:
         ),
         _row("run(), figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
         _row("super_twisting (R1), one step", "us", "<= 2", lambda: _step_us(lambda: SuperTwisting(setting))),
+        _row(
+            "super_twisting, a step 5 % off the period",
+            "us",
+            "<= 12",
+            lambda: _odd_step_us(setting, copy_step),
+        ),
+        _row("that by the matrix exponential", "us", "", lambda: _odd_step_us(setting, luenberger_copy)),
         _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
         _row(
             "sim-board: the same loop with wire and firmware, 200 us",

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dcmp_hil.fast_tuple import make
 from dcmp_hil.observers import standing_still
-from dcmp_hil.observers.matched import Gains, luenberger_copy, matched_gains
+from dcmp_hil.observers.matched import Gains, copy_step, luenberger_copy, matched_gains
 from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
@@ -203,7 +203,8 @@ class SuperTwisting:
         n = round(dt / self._period)
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
             return self._gaps[n]
-        return _solve(dt, self._f0, self._L1, self._L2, self.mu0)
+        gains = _per_step(matched_gains(self.mu0 * dt), dt)
+        return (*copy_step(dt, self._f0, self._L1, self._L2), *gains)
 
     def _sliding_gains(self, b: float, dt: float) -> Gains:
         """Gains of an innovation so small that the sliding term is faster than the floor."""

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dcmp_hil.observers.matched import copy_step as series_step
 from dcmp_hil.observers.matched import luenberger_copy, matched_gains
 from tests.observers.matrix_observer import L1, L2, POLES, copy_step, gains, taylor
 
@@ -33,6 +34,19 @@ def test_copy_equals_scipy_expm(dt: float, f0: float) -> None:
     expected = [*f[0], *f[1], *gu, *h0, *h1]
     # H0 = E - H1 and E / dt lose digits against the norm of E, about 1: absolute at 1e-15 of that.
     np.testing.assert_allclose(luenberger_copy(dt, f0, L1, L2), expected, rtol=1e-10, atol=1e-15)
+
+
+@given(
+    dt=st.floats(1e-6, 0.2),
+    f0=st.sampled_from([0.0, 0.1, 30.0, 100.0]),
+    gain1=st.floats(1e-3, 200.0),
+    gain2=st.floats(1e-3, 5000.0),
+)
+def test_copy_of_any_step_is_that_of_the_matrix_exponential(
+    dt: float, f0: float, gain1: float, gain2: float
+) -> None:
+    got, expected = series_step(dt, f0, gain1, gain2), luenberger_copy(dt, f0, gain1, gain2)
+    np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-14 * (1.0 + gain2))
 
 
 def test_gains_have_the_printed_digits_when_x_is_four_hundredths() -> None:
