@@ -37,6 +37,7 @@ FAILURES = (
 _NETWORKED = ("socketcand", "udp_multicast")
 _WAITING = ("robotell", "seeedstudio", "serial")  # they write without a bound: a frozen device would hold us
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
+_DAMAGE = 0x08 | 0x10 | 0x80  # there: protocol violation, transceiver, bus error
 _MOST_FOREIGN = 64  # frames that are passed over in one look; a bus full of errors is no reason to stay
 _LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
 
@@ -171,7 +172,7 @@ class CanLink:
                 if message is None:
                     return None
                 if message.is_error_frame:
-                    self._corrupt += 1
+                    self._corrupt += self._is_damage(message)
                     self._check_bus(message)
                 elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
                     return message.arbitration_id, bytes(message.data)
@@ -187,6 +188,10 @@ class CanLink:
             if socketcan.is_down(error):
                 raise socketcan.was_down(self._settings) from error
             raise self._broken(error) from error
+
+    def _is_damage(self, message: can.Message) -> bool:
+        """Whether an error frame tells of a frame that was damaged; socketcan tells of more than that."""
+        return self._settings.interface != "socketcan" or message.arbitration_id & _DAMAGE != 0
 
     def _check_bus(self, message: can.Message) -> None:
         if message.arbitration_id & _BUS_OFF:

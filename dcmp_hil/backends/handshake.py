@@ -21,6 +21,7 @@ from dcmp_hil.wire.messages import (
     ParameterSet,
     ParameterValue,
     Result,
+    SampleReport,
     State,
     Stop,
     StopReason,
@@ -70,6 +71,7 @@ class Handshake:
     def __init__(self, link: Link, caller: Caller, terms: Terms, clock: Clock) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._session = 1 + secrets.randbelow(0xFFFF)
+        self._booted_ns = 0  # the latest that a board has booted
 
     def run(self) -> Greeting:
         """Go through all of it; afterwards the device is in RUN and hears 0 V.
@@ -82,6 +84,7 @@ class Handshake:
         ConfigError
             If the device is not what the rig says.
         """
+        self._booted_ns = self._clock.now_ns() + int(1e9 * self._terms.boot_wait)
         self._listen()
         firmware = self._introduce()
         arming = False
@@ -119,7 +122,7 @@ class Handshake:
 
     def _listen(self) -> None:
         caller, wait = self._caller, self._terms.boot_wait
-        if caller.hear_sample(wait) is not None:
+        if caller.hear_sample(1e-9 * (self._booted_ns - self._clock.now_ns())) is not None:
             return
         name = self._link.name
         if caller.heard:
@@ -134,9 +137,7 @@ class Handshake:
         """Become the owner, and be told so twice: on a bus an IDENTITY may be the answer to somebody else."""
         told, identity = 0, None
         for _ in range(_HELLOS):
-            identity = self._caller.ask(Hello(self._session, PROTOCOL_HASH), Identity)
-            if identity is None:
-                raise refusals.deaf(self._link.name)
+            identity = self._ask_who()
             firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
             self._check_identity(identity, firmware)
             if identity.owned and not identity.mismatch:
@@ -150,6 +151,19 @@ class Handshake:
         if identity is not None and identity.mismatch:
             raise refusals.impossible(self._link.name, "that this host's protocol is not its own; it is")
         raise refusals.owned(self._link.name)
+
+    def _ask_who(self) -> Identity:
+        """Ask with HELLO; where all fell silent meanwhile, a board boots because its port was opened."""
+        hello = Hello(self._session, PROTOCOL_HASH)
+        while True:
+            before = self._caller.heard[SampleReport.__name__]
+            identity = self._caller.ask(hello, Identity)
+            if identity is not None:
+                return identity
+            booted = self._clock.now_ns() >= self._booted_ns
+            if booted or self._caller.heard[SampleReport.__name__] != before:
+                raise refusals.deaf(self._link.name)
+            self._listen()
 
     def _check_identity(self, identity: Identity, firmware: str) -> None:
         name = self._link.name

@@ -86,6 +86,26 @@ def test_board_that_boots_when_its_port_is_opened_can_be_used(script: Callable[.
     assert "ended by" in done.out
 
 
+def test_samples_from_before_the_boot_mislead_nobody(cli: Cli) -> None:
+    """What the line still carried is heard; then the board boots, silent, for a second and a half."""
+    with device() as pump:
+        hear, waking = pump.board.receive, threading.Timer(1.5, pump.silent.clear)
+
+        def reset_once(data: bytes) -> None:
+            if not waking.is_alive() and not waking.finished.is_set():
+                pump.silent.set()
+                pump.board.reset()
+                waking.start()
+            else:
+                hear(data)
+
+        pump.board.receive = reset_once  # type: ignore[method-assign]
+        outcome = start(cli, path_of(pump), "backend.boot_wait_s=30")
+        waking.join()
+    assert "does not answer" not in outcome.err
+    assert "ended by" in outcome.out
+
+
 @pytest.mark.parametrize(
     ("carrier", "rig", "key", "hint"),
     [
