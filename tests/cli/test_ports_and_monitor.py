@@ -295,7 +295,7 @@ def test_monitor_decodes_both_sides_of_a_bus(cli: Cli) -> None:
         thread.start()
         try:
             outcome = cli(
-                "monitor", "bench-can", "--all", "--duration", "1.0",
+                "monitor", "bench-can", "--all", "--duration", "4.0",
                 "--set", "backend.interface=virtual", "--set", f"backend.channel={channel}",
             )  # fmt: skip
         finally:
