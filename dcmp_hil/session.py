@@ -97,7 +97,7 @@ class Result:
     motor_gain: MotorGain | None = None
 
 
-_AT_ZERO: tuple[Literal["INFO", "WARN"], str] = ("INFO", "amplifier at 0 V")
+_AT_ZERO: tuple[Literal["INFO", "ERROR"], str] = ("INFO", "amplifier at 0 V")
 
 
 class Session:
@@ -236,7 +236,7 @@ class Session:
         for sink in self._deferred:
             sink.make()
         if self._apart:
-            self._apart.open()
+            self._apart.open(lambda: self.stop.requested)
         if self._control:
             self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
         return nullcontext()
@@ -365,12 +365,12 @@ def run(
     return session.result()
 
 
-def _end_after(error: BaseException) -> tuple[Literal["INFO", "WARN"], str]:
+def _end_after(error: BaseException) -> tuple[Literal["INFO", "ERROR"], str]:
     """Say what is known of the amplifier after an error: a device that did not answer confirmed nothing."""
     if isinstance(error, OpenError):
         return "INFO", "the device was not armed"
     if isinstance(error, BackendError) or getattr(error, "__notes__", None):
-        return "WARN", "0 V was not confirmed: the device goes there by itself"
+        return "ERROR", "0 V was not confirmed: the device goes there by itself"
     return _AT_ZERO
 
 

@@ -196,7 +196,8 @@ class CanLink:
     def _check_bus(self, message: can.Message) -> None:
         if message.arbitration_id & _BUS_OFF:
             raise LinkError(
-                f"{self.name}: bus-off. Check termination (120 ohm at both ends), bit rate and wiring, then "
+                f"{self.name}: bus-off. The device goes to 0 V by itself. Check termination (120 ohm at both "
+                "ends), bit rate and wiring, then "
                 f"bring the interface up again: ip link set {self._settings.channel} down, then up."
             )
 

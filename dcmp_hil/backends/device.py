@@ -128,7 +128,7 @@ class DeviceBackend:
         except BackendError as unconfirmed:
             if error is None:
                 raise
-            if str(unconfirmed) != str(error):  # a link that broke says so again
+            if not isinstance(error, BackendError):  # a link that broke says so again, in other words
                 error.add_note(str(unconfirmed))
         finally:
             self._link.close()

@@ -1,4 +1,4 @@
-"""Whoever looks on at a run, made in the telemetry process.
+"""The sinks of a run, made in the telemetry process.
 
 Apart from the run itself, whose imports that process would wait for half a second.
 """
@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.console import Console
+
+from dcmp_hil import process_log
 from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.status import StatusLine
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 def status_line(period: float) -> Sink:
     """Return the status line of a run whose samples come every `period` (s)."""
     streams.guard()
+    _use_terminal()
     return StatusLine(console.err, period)
 
 
@@ -35,10 +39,12 @@ def recording(path: Path, period: float, run: dict[str, str], rig: str) -> Sink:
 
 
 def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:
-    """Return the Rerun dashboard, its recording, or both."""
+    """Return the Rerun dashboard, its recording, or both; say where a viewer finds it."""
+    from dcmp_hil.cli.watching import watched
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
 
-    return RerunSink(rig=view, record=record, viewer=viewer, port=port)
+    _use_terminal()
+    return watched(RerunSink(rig=view, record=record, viewer=viewer, port=port), viewer)
 
 
 def dashboard_replacing(view: RigView, record: Path, viewer: Viewer, port: int) -> Sink:
@@ -95,3 +101,10 @@ class _Replacing:
         finally:
             if not self._began:
                 self._beside.unlink(missing_ok=True)
+
+
+def _use_terminal() -> None:
+    """Print on the terminal, in the telemetry process, whose own standard error is a log."""
+    number = process_log.terminal()
+    if number is not None and console.err.file.fileno() != number:
+        console.err = Console(file=streams.text_on(number), soft_wrap=True)

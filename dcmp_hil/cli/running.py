@@ -9,13 +9,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dcmp_hil import __version__
+from dcmp_hil import __version__, process_log
 from dcmp_hil.cli import console
+from dcmp_hil.cli.foreign_lines import split_stderr
 from dcmp_hil.cli.onlookers import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
-from dcmp_hil.cli.watching import watched
+from dcmp_hil.cli.watching import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
@@ -23,6 +24,7 @@ from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
+from dcmp_hil.telemetry import viewer as window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +52,6 @@ class Options:
     json_file: str | None
     note: str
     faults: tuple[str, ...] = ()
-    port: int = 0  # of the recording's own server
     control: bool = True
 
 
@@ -68,8 +69,8 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
         rig = load_rig(rig_name, [*overrides, _BOARD])
     faults = inject(rig, options.faults, "--fault")
     # From here on stops are heard: opening a viewer takes its time, too.
-    with StopRequest() as stop, watched(_viewer(options)) as (viewer, port):
-        return _run(rig, faults, replace(options, viewer=viewer, port=port), stop)
+    with StopRequest() as stop:
+        return _run(rig, faults, replace(options, viewer=chosen(options.viewer)), stop)
 
 
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
@@ -77,11 +78,12 @@ def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
     folder = RunFolder(rig.name) if options.keep else None
     began = False
     try:
-        session = _session(rig, faults, options, folder, stop)
-        end = _to_its_end(session)
-        began = session.began
-        if began:
-            _conclude(session, options, folder, end)
+        with split_stderr(folder.path / process_log.FILE if folder else None):
+            session = _session(rig, faults, options, folder, stop)
+            end = _to_its_end(session)
+            began = session.began
+            if began:
+                _conclude(session, options, folder, end)
     finally:
         if folder is not None and not began:  # its error says why
             folder.discard()
@@ -144,32 +146,22 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     if folder is not None:
         run, text = about(rig, options.note, options.faults, folder.path), rig_json(rig)
         makers.append(partial(recording, folder.own, rig.period, run, text))
-    viewer = _viewer(options)
+    viewer = options.viewer or "none"
     own = folder.recording if folder else None
     if options.record is not None or own is not None or viewer != "none":
         from dcmp_hil.telemetry.rig_view import view_of
 
         view = view_of(rig)
         if options.record is not None:
-            makers.append(partial(dashboard_replacing, view, options.record, viewer, options.port))
+            makers.append(partial(dashboard_replacing, view, options.record, viewer, window.PORT))
         else:
-            makers.append(partial(dashboard, view, own, viewer, options.port))
+            makers.append(partial(dashboard, view, own, viewer, window.PORT))
     return makers
-
-
-def _viewer(options: Options) -> Viewer:
-    if options.viewer is not None:
-        return options.viewer
-    from dcmp_hil.telemetry.display import display_available
-
-    if display_available():
-        return "spawn"
-    return "none"
 
 
 def _wants_picture(options: Options) -> bool:
     """Where nobody sees the run live, a picture of it stays behind."""
-    return _viewer(options) == "none"
+    return options.viewer == "none"
 
 
 def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> None:
@@ -190,7 +182,7 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
         if folder is not None:
             if not cut_off:  # drawing takes seconds, which whoever ended the run early has not got
                 folder.draw(result)
-            folder.tell(options.record, live=_viewer(options) != "none")
+            folder.tell(options.record, live=options.viewer != "none")
 
 
 def _document(session: Session, options: Options, result: Result, ended_by: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
-_STYLES = {"WARN": "yellow", "ERROR": "bold red"}
+_WARNING = "yellow"
 
 
 class StatusLine:
@@ -49,11 +49,11 @@ class StatusLine:
         self._live.update(self._line(block), refresh=True)
 
     def event(self, event: Event) -> None:
-        """Print warnings and errors; remember the phase."""
+        """Print warnings; remember the phase. An error is the run's end, which says it itself, once."""
         if event.level == "PHASE":
             self._phase = event.text
-        elif event.level in _STYLES:
-            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_STYLES[event.level]))
+        elif event.level == "WARN":
+            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING))
 
     def close(self) -> None:
         """Take the line away; the summary follows."""

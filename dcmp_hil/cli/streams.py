@@ -73,6 +73,11 @@ def guard() -> None:
     sys.stderr = _guarded(sys.stderr, _ERR)
 
 
+def text_on(number: int) -> TextIO:
+    """Return a stream like those of `guard` on a descriptor, which it never closes."""
+    return _text(number, getattr(sys.stderr, "encoding", None) or "utf-8", line_buffering=True)
+
+
 def output_failed() -> bool:
     """Return whether standard output was given up: a command that only prints can end then."""
     raw = _raw(sys.stdout)

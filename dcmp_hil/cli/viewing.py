@@ -9,7 +9,7 @@ from dcmp_hil.cli.watching import web_viewer
 from dcmp_hil.clock import pause
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.display import display_available
+from dcmp_hil.telemetry.display import display_problem
 
 _PAUSE = 0.5  # s
 
@@ -30,9 +30,9 @@ def attach(port: int | None, *, web: bool) -> None:
     if web:
         with web_viewer(place):
             _until_it_ends(place)
-    elif not display_available():
+    elif problem := display_problem():
         raise ConfigError(
-            "There is no display (neither DISPLAY nor WAYLAND_DISPLAY is set) for a window. Use --web, or "
+            f"No window can be opened: {problem}. Use --web, or "
             f"from another computer: ssh -L {place}:{window.LOOPBACK}:{place} here, then rerun --connect "
             f"{window.proxy_url(place)} there."
         )

@@ -1,53 +1,78 @@
-"""Ways to watch a run: a window, a page in a browser, whoever comes and goes."""
+"""Ways to watch a run: a window, a page in a browser, viewers that come and go."""
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import console
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.display import display_available
+from dcmp_hil.telemetry.display import display_available, display_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dcmp_hil.telemetry.rerun_sink import Viewer
+    from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.rerun_sink import RerunSink, Viewer
+    from dcmp_hil.values import Event
 
-_START = 5.0  # s, until the pages are served
-_ENDING = 1.0  # s
+_START = 60.0  # s, a far limit: that the pages are served is an event
 
 
-@contextmanager
-def watched(viewer: Viewer) -> Iterator[tuple[Viewer, int]]:
-    """Tell where a run will be seen, and serve pages as long as it lasts.
+def chosen(viewer: Viewer | None) -> Viewer:
+    """Return how a run is shown: as asked for, else in a window where one can be opened.
 
-    Yields
-    ------
-    tuple
-        How it is watched after all, and the port that its recording is to be served on.
+    A display that was asked for, or is announced, and cannot be opened costs a warning: then there is a
+    picture, as without a display.
     """
-    if viewer not in {"serve", "web"}:
-        yield viewer, window.PORT
-        return
-    port = window.free_port()
-    if port is None:
-        console.warn(
-            f"No port from {window.PORT} on is free on {window.LOOPBACK}: the run goes on and nobody can "
-            "watch. Close viewers that are no longer needed."
-        )
-        yield "none", window.PORT
-    elif viewer == "serve":
-        console.note(f"to watch: dcmp-hil view, or rerun --connect {window.proxy_url(port)}")
-        yield viewer, port
-    else:
-        with web_viewer(port):
-            yield viewer, port
+    if viewer not in {None, "spawn"}:
+        return viewer
+    if viewer is None and not display_available():
+        return "none"
+    problem = display_problem()
+    if not problem:
+        return "spawn"
+    console.warn(f"No viewer window: {problem}. To watch in a browser: --viewer web.")
+    return "none"
+
+
+def watched(sink: RerunSink, viewer: Viewer) -> Sink:
+    """Tell where a run is served, and serve pages as long as it lasts."""
+    if sink.port is None or viewer not in {"serve", "web"}:
+        return sink
+    if viewer == "serve":
+        console.note(f"to watch: dcmp-hil view, or rerun --connect {window.proxy_url(sink.port)}")
+        return sink
+    return _WithPages(sink, sink.port)
+
+
+class _WithPages:
+    """A sink whose pages are served until it is closed."""
+
+    def __init__(self, sink: RerunSink, port: int) -> None:
+        self._sink = sink
+        self.warnings = sink.warnings
+        self._pages = ExitStack()
+        self._pages.enter_context(web_viewer(port))
+
+    def block(self, block: Block) -> None:
+        """Take consecutive periods."""
+        self._sink.block(block)
+
+    def event(self, event: Event) -> None:
+        """Take an event."""
+        self._sink.event(event)
+
+    def close(self) -> None:
+        """End the pages, and write what is left."""
+        self._pages.close()  # first: the other may take its time, and this process may be ended meanwhile
+        self._sink.close()
 
 
 @contextmanager
 def web_viewer(port: int) -> Iterator[None]:
-    """Serve the web viewer of what is served on `port`, and tell its address; without it life goes on."""
+    """Serve the web viewer of what is served on `port`, and tell its address; a failure is a warning."""
     with pages(port) as address:
         if address:
             console.note(f"web viewer: {address}")
@@ -58,30 +83,33 @@ def web_viewer(port: int) -> Iterator[None]:
 @contextmanager
 def pages(port: int) -> Iterator[str]:
     """Serve the web viewer of what is served on `port`; yield its address, nothing where that fails."""
-    process, problem = None, ""
-    web_port = window.free_port(window.WEB_PORT)
-    if web_port is None:
-        problem = f"no port from {window.WEB_PORT} on is free on {window.LOOPBACK}"
-    else:
+    problem = f"no port from {window.WEB_PORT} on is free on {window.LOOPBACK}"
+    process, address = None, ""
+    for web_port in window.free_ports(window.WEB_PORT):
         try:
             process = window.start_web_viewer(web_port, port)
         except OSError as error:
             problem = str(error)
-        else:
-            problem = "" if window.answers(web_port, _START) else "its pages are not served"
-    if problem:
+            break
+        if window.serves(web_port, process.pid, _START):
+            address = window.web_url(web_port, port)
+            break
+        process.kill()  # another process took the port first
+        problem = f"its pages are not served, exit code {process.wait()}"
+        process = None
+    if not address:
         console.warn(f"No web viewer ({problem}); to watch: dcmp-hil view")
     try:
-        yield "" if problem or web_port is None else window.web_url(web_port, port)
+        yield address
     finally:
         if process is not None:
-            process.terminate()
-            process.wait(_ENDING)
+            process.kill()  # it keeps nothing, and the telemetry process has it ignore SIGTERM
+            process.wait()
 
 
 def open_browser(address: str) -> None:
     """Open a page where there is a display; where there is no browser the address is on the screen."""
-    if not display_available():
+    if not display_available() or display_problem():
         return
     import webbrowser
 

@@ -86,7 +86,8 @@ class Server:
             OSError,
             ValueError,
             RecursionError,
-        ):  # gone, or no line of JSON
+            asyncio.CancelledError,
+        ):  # gone, no line of JSON, or the run's end, which CPython 3.11 would print as an error
             pass
         finally:
             self._watchers.discard(writer)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import atexit
 import os
 import pickle
-import signal
+import select
 import socket
 import subprocess
 import sys
@@ -21,8 +21,10 @@ from typing import TYPE_CHECKING
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.process_log import terminal_copy
+from dcmp_hil.telemetry.answers import end_process, how_it_ended, receive, receive_from_working
 from dcmp_hil.telemetry.audience import Audience
-from dcmp_hil.telemetry.child import DONE, FIGURES, MESSAGE, UP, Setup, State
+from dcmp_hil.telemetry.child import DONE, FIGURES, UP, Setup, State
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
 from dcmp_hil.telemetry.ring import Ring, size_of
 from dcmp_hil.telemetry.shared import Ledger, mapped, reserve
@@ -35,9 +37,11 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.statistics import Statistics
 
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
-_COMING_UP = 30.0  # s; nothing is armed yet
-_ANSWER = 1.5  # s for the figures, at the end of a run
+_COMING_UP = 600.0  # s, a far limit: that it came up is an event, and nothing is armed yet
+_SLOW = 30.0  # s after which the user is told what is waited for
+_ANSWER = 1.5  # s that a process which does nothing has for the figures, at the end of a run
 _REAPING = 0.2  # s
+_LOOK = 0.1  # s
 _LEAVING = 2.0  # s that the end of a run takes at most
 _LAST = 12.0  # s that the end of this process takes at most, for a window that is still opening
 _EVENTS = 10_000
@@ -46,7 +50,7 @@ _CODE = """
 import sys
 sys.path[:] = {path!r}
 from dcmp_hil.telemetry.child import main
-main({connection}, {setup})
+main({connection}, {setup}, {terminal})
 """
 
 
@@ -108,8 +112,8 @@ class Apart:
         self._model = model
         os.write(self._setup, pickle.dumps(setup))
 
-    def open(self) -> None:
-        """Start the process and wait until its sinks are made, for 30 s at most.
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Start the process and wait until its sinks are made, or it ends, or `stopped` says so.
 
         Raises
         ------
@@ -121,16 +125,17 @@ class Apart:
         except OSError as error:
             self._go_without(f"could not be started ({error})")
             return
-        answer = _hear(channel, _COMING_UP)
+        answer = self._wait_until_up(channel, stopped)
         if answer == UP:
             self._process, self._channel, self.pid = process, channel, process.pid
             self._send_events()
             return
         channel.close()
-        _end(process, 0.0)
+        end_process(process, 0.0)
         if answer:
             raise ConfigError(*pickle.loads(answer))  # noqa: S301 - written by our own child
-        self._go_without("did not come up")
+        if not stopped():
+            self._go_without("did not come up")
 
     def event(self, event: Event) -> None:
         """Send an event, or keep it until there is room; never blocks."""
@@ -155,14 +160,30 @@ class Apart:
 
     # ---------------------------------------------------------------- the process
 
+    def _wait_until_up(self, channel: socket.socket, stopped: Callable[[], bool]) -> bytes:
+        """Return the first message; nothing if the process ended, was not waited for, or takes minutes."""
+        clock = MonotonicClock()
+        began_ns, told = clock.now_ns(), False
+        while not stopped() and (waited := 1e-9 * (clock.now_ns() - began_ns)) < _COMING_UP:
+            if select.select([channel], [], [], min(_LOOK, _COMING_UP))[0]:
+                return receive(channel, _LOOK)
+            if waited > _SLOW and not told and self._warn_user:
+                told = True
+                self._warn_user(
+                    f"The telemetry process is still starting after {_SLOW:g} s; Ctrl-C ends this."
+                )
+        return b""
+
     def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket]:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
-            code = _CODE.format(path=sys.path, connection=theirs.fileno(), setup=self._setup)
+        with theirs, terminal_copy() as terminal:
+            code = _CODE.format(
+                path=sys.path, connection=theirs.fileno(), setup=self._setup, terminal=terminal
+            )
             try:
                 process = subprocess.Popen(  # noqa: S603 - our own code
                     [sys.executable, "-c", code],
-                    pass_fds=[theirs.fileno(), *self._files],
+                    pass_fds=[theirs.fileno(), terminal, *self._files],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
                 )
@@ -178,17 +199,19 @@ class Apart:
         with suppress(OSError):
             self._send_events()
             channel.shutdown(socket.SHUT_WR)
-        if _hear(channel, _ANSWER) != FIGURES:
+        if receive_from_working(process, channel, _ANSWER) != FIGURES:
             with suppress(subprocess.TimeoutExpired):  # where nobody listens any more it has ended already
-                return _how(process.wait(_REAPING))
-            _end(process, 0.0)
+                return how_it_ended(process.wait(_REAPING))
+            end_process(process, 0.0)
             return f"did not answer for {_ANSWER} s"
-        if _hear(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
+        if receive(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
             if process.poll() is not None:
-                return _how(process.returncode)
-            atexit.register(_end, process, _LAST)  # a window that is still opening, or a disk that is slow
+                return how_it_ended(process.returncode)
+            atexit.register(
+                end_process, process, _LAST
+            )  # a window that is still opening, or a disk that is slow
             return ""
-        _end(process, _LEAVING)
+        end_process(process, _LEAVING)
         return ""
 
     def _send_events(self) -> None:
@@ -228,29 +251,3 @@ class Apart:
         take(Event(self.ring.newest, "WARN", sentence))
         if self._warn_user:
             self._warn_user(sentence)
-
-
-def _hear(channel: socket.socket, within: float) -> bytes:
-    """Return the next message; nothing if there is none in time, or never will be."""
-    channel.settimeout(max(within, 1e-3))
-    try:
-        return channel.recv(MESSAGE)
-    except OSError:
-        return b""
-    finally:
-        channel.setblocking(False)  # a socket with a timeout waits even where it is told not to
-
-
-def _end(process: subprocess.Popen[bytes], within: float) -> int:
-    """Wait for a process so many seconds, then kill it; return how it ended."""
-    with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
-        return process.wait(within)
-    process.kill()
-    return process.wait()
-
-
-def _how(code: int) -> str:
-    """Say how a process ended."""
-    if code == 0:
-        return "left"
-    return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"failed (exit code {code})"

@@ -17,8 +17,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil import process_log
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.answers import MESSAGE
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
 from dcmp_hil.telemetry.outlet import THREAD
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.statistics import Statistics
 
 UP, FIGURES, DONE = b"up", b"figures", b"done"
-MESSAGE = 1 << 16  # bytes, the longest
 _IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
 _CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
 
@@ -75,8 +76,17 @@ class State(NamedTuple):
     troubles: list[str]
 
 
-def main(connection: int, setup: int) -> None:
-    """Serve, then leave; `connection` and `setup` are descriptors of a socket and of a pickled Setup."""
+def main(connection: int, setup: int, terminal: int) -> None:
+    """Serve, then leave.
+
+    Parameters
+    ----------
+    connection, setup
+        Descriptors of a socket, and of a pickled Setup.
+    terminal
+        Descriptor for the run's own lines; descriptor 2 takes what libraries write.
+    """
+    process_log.use_terminal(terminal)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # the parent decides
         signal.signal(number, signal.SIG_IGN)
     with suppress(OSError):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import os
+import shutil
 import threading
+import weakref
 from contextlib import suppress
 from queue import Full, Queue
 from typing import TYPE_CHECKING
@@ -11,6 +15,7 @@ from dcmp_hil.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     import rerun as rr
 
@@ -21,7 +26,31 @@ THREAD = "rerun"
 _WAITING = 32  # jobs; 3 s of a run in real time
 _LOOK = 0.05  # s
 _FLUSH = 5.0  # s
-_STALL, _LAST_STALL = 4.0, 1.5  # s, in a run and at its end: a full disk may leave a flush waiting for ever
+_STALL = 4.0  # s that a file does not grow in a run while it is flushed
+_FULL_STALL = 1.5  # s where there is no room: that flush may wait for ever
+_ROOM = 1 << 20  # bytes
+
+
+def room_for(file: Path) -> float:
+    """Return by how many bytes a file may grow: what is free on its disk, or the limit of this process."""
+    room = math.inf
+    with suppress(OSError):
+        room = shutil.disk_usage(file.parent).free
+    with suppress(ImportError):  # not POSIX
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+        if limit != resource.RLIM_INFINITY:
+            room = min(room, limit - size_of(file))
+    return room
+
+
+def size_of(file: Path) -> int:
+    """Return the bytes of a file; 0 if it is not there."""
+    try:
+        return file.stat().st_size
+    except OSError:
+        return 0
 
 
 def _no_farewell() -> None:
@@ -39,8 +68,9 @@ class Outlet:
         s that `do` waits when the thread is behind.
     ending
         s that `close` waits at most.
-    flushes
-        Whether to flush after every job, which raises where what was written is lost.
+    file
+        What the stream is written to. It is flushed after every job, which raises where what was written is
+        lost; None for a viewer, which is not.
 
     Attributes
     ----------
@@ -49,24 +79,48 @@ class Outlet:
     """
 
     def __init__(
-        self, stream: rr.RecordingStream, patience: float, ending: float, *, flushes: bool = False
+        self, stream: rr.RecordingStream, patience: float, ending: float, *, file: Path | None = None
     ) -> None:
         self.farewell: Callable[[], None] = _no_farewell
         self._stream = stream
         self._patience = patience
         self._ending = ending
-        self._flushes = flushes
+        self.file = file
+        self._opened: int | None = None  # its descriptor: a file may get another name
+        if file is not None:
+            with suppress(OSError):
+                self._opened = os.open(file, os.O_RDONLY)
+                weakref.finalize(self, os.close, self._opened)
         self._jobs: Queue[Job | None] = Queue(_WAITING)
         self._error: Exception | None = None
         self._clock = MonotonicClock()
-        self._began_ns = 0  # the job at hand; 0 for none
+        self._began_ns = self._grew_ns = 0  # the job at hand, 0 for none; when the file was seen to grow
+        self._size = 0  # bytes of the file
         self._thread = threading.Thread(target=self._serve, name=THREAD, daemon=True)
         self._thread.start()
 
+    def size(self) -> int:
+        """Return the bytes of the file, under the name that it has by now; 0 for a viewer."""
+        if self._opened is not None:
+            return os.fstat(self._opened).st_size
+        return 0 if self.file is None else size_of(self.file)
+
+    @property
+    def stalled(self) -> float:
+        """How long (s) the file has not grown while a job for it is done; 0 for a viewer."""
+        began_ns, now_ns = self._began_ns, self._clock.now_ns()
+        if self.file is None or not began_ns:
+            return 0.0
+        size = self.size()
+        if size != self._size:
+            self._size, self._grew_ns = size, now_ns
+        return 1e-9 * (now_ns - max(began_ns, self._grew_ns))
+
     def _stalls(self, patience: float) -> bool:
-        """Tell whether what is flushed after every job has waited for that for `patience` (s)."""
-        began_ns = self._began_ns
-        return self._flushes and began_ns > 0 and self._clock.now_ns() - began_ns > patience * 1e9
+        stalled = self.stalled
+        return stalled > patience or (
+            stalled > _FULL_STALL and self.file is not None and room_for(self.file) < _ROOM
+        )
 
     def do(self, job: Job) -> bool:
         """Put `job` behind those that wait; False if there was no room in all the time of `patience`.
@@ -94,16 +148,25 @@ class Outlet:
         ------
         Exception
             Whatever an earlier job raised.
+        TimeoutError
+            If a file is not finished by then.
         """
-        within = 0.0 if self._stalls(_LAST_STALL) else min(within, self._ending)
+        within = 0.0 if self._stalls(self._ending) else min(within, self._ending)
         end_ns = self._clock.now_ns() + int(within * 1e9)
         with suppress(Full):
             self._jobs.put(None, timeout=within)
-            while self._thread.is_alive() and self._clock.now_ns() < end_ns and not self._stalls(_LAST_STALL):
+            while (
+                self._thread.is_alive() and not self._stalls(self._ending) and self._clock.now_ns() < end_ns
+            ):
                 self._thread.join(min(_LOOK, max(0, end_ns - self._clock.now_ns()) * 1e-9))
         self._raise_what_was_raised()
-        if self._stalls(_LAST_STALL):
-            raise TimeoutError("the disk takes nothing any more")
+        if self.file is not None and self._thread.is_alive():
+            stalled = self.stalled
+            raise TimeoutError(
+                f"it did not grow for {stalled:.1f} s"
+                if self._clock.now_ns() < end_ns or stalled > 0.5 * within
+                else f"it was still being written {within:.1f} s after the end"
+            )
 
     def leave(self) -> None:
         """End the stream after the last job, and wait for nothing."""
@@ -115,7 +178,7 @@ class Outlet:
             self._began_ns = self._clock.now_ns()
             try:
                 job(self._stream)
-                if self._flushes:
+                if self.file is not None:
                     self._stream.flush(timeout_sec=_FLUSH)
             except Exception as error:  # noqa: BLE001 - told to whoever brings the next job
                 self._error = error
@@ -124,7 +187,7 @@ class Outlet:
         try:
             self._stream.flush(timeout_sec=_FLUSH)
         except Exception as error:  # noqa: BLE001 - a full disk or a frozen viewer: disconnecting waits for ever
-            self._error = error if self._flushes else self._error
+            self._error = error if self.file is not None else self._error
             return
         self.farewell()
         self._stream.disconnect()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import atexit
+import math
+import os
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 from uuid import uuid4
@@ -15,14 +17,15 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.blueprint import dashboard
-from dcmp_hil.telemetry.display import display_available
+from dcmp_hil.telemetry.display import display_problem
 from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.outlet import Outlet
+from dcmp_hil.telemetry.outlet import Outlet, room_for
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.scenery import log_scenery, log_style
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Sequence
     from pathlib import Path
 
@@ -33,16 +36,20 @@ if TYPE_CHECKING:
 
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
-_SERVER_START = 3.0  # s
+_SERVER_START = 60.0  # s, a far limit: that it listens is an event, and nothing is armed yet
 _CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
 _FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
 _STUCK = (
-    "The viewer, or the disk, has taken nothing for seconds and is left behind; the run goes on. "
+    "The viewer has taken nothing for seconds and is left behind; the run goes on. "
     "Close that viewer and open another."
 )
-_INCOMPLETE = "The recording is incomplete: {error}. Free some space; the run goes on."
+_SCARCE = 100e6  # bytes free below which a disk is the likely cause
+_NO_WINDOW = (
+    "The viewer ended by itself (exit code {code}; process.log in the run's folder has its words). "
+    "The run is served on port {port}: dcmp-hil view --port {port} --web"
+)
 
 
 class RerunSink:
@@ -90,6 +97,7 @@ class RerunSink:
         self.warnings: list[str] = []
         self._logged: set[str] = set()
         self.port: int | None = None
+        self._window: subprocess.Popen[bytes] | None = None
         self._rig = rig
         self._frames = Frames(rig)
         self._outlets: list[Outlet] = []
@@ -113,7 +121,12 @@ class RerunSink:
         if not self._frames.plots:
             self._frames.choose_lines(block)
             self._tell(partial(_log_styles, self._frames.plots))
-        self._tell(partial(_send, self._frames.of_block(block)), float(block["t"][-1]))
+        t = float(block["t"][-1])
+        self._tell(partial(_send, self._frames.of_block(block)), t)
+        if self._window and (code := self._window.poll()) is not None:
+            self._window = None
+            if code:  # closed by the user it is 0
+                self._warn(t, _NO_WINDOW.format(code=code, port=self.port))
 
     def event(self, event: Event) -> None:
         """Take an event; one of our own warnings that comes back is there already."""
@@ -125,22 +138,22 @@ class RerunSink:
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(_CLOSING * 1e9)
         atexit.unregister(self.close)
-        errors: list[Exception] = []
+        faults: list[str] = []
         for outlet in self._outlets:
             try:
                 outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
-                errors.append(error)
-        if errors:
-            raise RuntimeError(_INCOMPLETE.format(error=errors[0]))
+                faults.append(_incomplete(outlet, str(error)))
+        if faults:
+            raise RuntimeError(faults[0])
 
     def _tell(self, job: Job, t: float = 0.0) -> None:
         for outlet in tuple(self._outlets):
             try:
-                sentence = "" if outlet.do(job) else _STUCK
+                sentence = "" if outlet.do(job) else _stuck(outlet)
             except Exception as error:  # noqa: BLE001 - one outlet that fails is no reason to lose the other
                 outlet.leave()
-                sentence = _INCOMPLETE.format(error=error)
+                sentence = f"{_incomplete(outlet, str(error))} The run goes on."
             if sentence:
                 self._outlets.remove(outlet)
                 self._warn(t, sentence)
@@ -169,7 +182,7 @@ class RerunSink:
             _begin(rr.FileSink(record), self._rig, stream)
         except RuntimeError as error:  # a file that can be opened, on a disk that is full
             raise ConfigError(f"The recording cannot begin: {error}. Free some space.") from None
-        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING, flushes=True))
+        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING, file=record))
 
     def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> Outlet:
         outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
@@ -187,10 +200,10 @@ class RerunSink:
         )
 
     def _spawn(self, first_port: int) -> None:
-        if not display_available():
+        problem = display_problem()
+        if problem:
             self.warnings.append(
-                "There is no display (neither DISPLAY nor WAYLAND_DISPLAY is set), so no viewer was opened; "
-                "look at the recording afterwards, or use --viewer none."
+                f"No window was opened: {problem}. See the recording afterwards, or use --viewer serve."
             )
             return
         outlet = self._serve(first_port)
@@ -199,29 +212,50 @@ class RerunSink:
 
     def _serve(self, first_port: int) -> Outlet | None:
         """Let viewers come and go; who comes late gets what there was."""
-        self.port = window.free_port(first_port)
-        if self.port is None:
-            self.warnings.append(
-                f"No port from {first_port} on is free on 127.0.0.1, so no viewer was opened; "
-                "close viewers that are no longer needed."
-            )
-            return None
-        target = rr.GrpcServerSink(window.LOOPBACK, self.port, server_memory_limit="256MiB")
-        return self._open_viewer(target, _CLOSING)
+        for port in window.free_ports(first_port):
+            target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit="256MiB")
+            outlet = self._open_viewer(target, _CLOSING)
+            if window.serves(port, os.getpid(), _SERVER_START):
+                self.port = port
+                return outlet
+            outlet.leave()  # another process took the port first
+            self._outlets.remove(outlet)
+        self.warnings.append(
+            f"No port from {first_port} on is free on 127.0.0.1, so no viewer was opened; "
+            "close viewers that are no longer needed."
+        )
+        return None
 
     def _open_window(self, outlet: Outlet, port: int) -> None:
         """Open it on what is known before the first period."""
         try:
-            if window.answers(port, _SERVER_START):
-                process = window.start_viewer(port)
-                outlet.farewell = partial(window.let_viewer_catch_up, process, port)
-                return
-            reason = f"nothing answers on 127.0.0.1:{port}"
+            process = window.start_viewer(port)
         except OSError as error:
-            reason = str(error)
-        self.warnings.append(
-            f"The viewer did not start ({reason}); try: rerun --connect {window.proxy_url(port)}"
-        )
+            self.warnings.append(
+                f"The viewer did not start ({error}); try: rerun --connect {window.proxy_url(port)}"
+            )
+            return
+        outlet.farewell = partial(window.let_viewer_catch_up, process, port)
+        self._window = process
+
+
+def _stuck(outlet: Outlet) -> str:
+    if outlet.file is None:
+        return _STUCK
+    return f"{_incomplete(outlet, f'it did not grow for {outlet.stalled:.0f} s')} The run goes on."
+
+
+def _incomplete(outlet: Outlet, reason: str) -> str:
+    """Say that a recording, or what a viewer got, is incomplete, with what was measured."""
+    if outlet.file is None:
+        return f"What the viewer shows is incomplete: {reason}."
+    measured = f"{1e-6 * outlet.size():.1f} MB are in it"
+    remedy = ""
+    room = room_for(outlet.file)
+    if math.isfinite(room):
+        measured += f", there is room for {1e-9 * room:.1f} GB more"
+        remedy = " Free some space." if room < _SCARCE else ""
+    return f"The recording is incomplete: {reason.rstrip('.')} ({measured}).{remedy}"
 
 
 def _begin(

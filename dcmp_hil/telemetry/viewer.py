@@ -5,11 +5,17 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from dcmp_hil import process_log
 from dcmp_hil.clock import MonotonicClock, pause
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 LOOPBACK = "127.0.0.1"
 PORT, WEB_PORT = 9876, 9090
@@ -18,7 +24,7 @@ _BUSY = 3.0  # s that a server may take on a busy computer; where nobody listens
 _LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
-_ESTABLISHED = "01"  # in there
+_ESTABLISHED, _LISTENING = "01", "0A"  # in there
 _HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))  # with empty settings
 _SETTINGS = b"\x04"  # type of the frame that every HTTP/2 server answers with
 _NOWHERE = "http://127.0.0.1:9"  # the port that discards; nobody listens there
@@ -31,8 +37,8 @@ def proxy_url(port: int) -> str:
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
-def free_port(first: int = PORT) -> int | None:
-    """Return the first port from `first` on that nobody listens on; None if there is none near."""
+def free_ports(first: int) -> Iterator[int]:
+    """Yield the ports from `first` on that are free at the moment when each is asked for."""
     for port in range(first, first + _PORTS_TRIED):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does
@@ -40,8 +46,60 @@ def free_port(first: int = PORT) -> int | None:
                 probe.bind((LOOPBACK, port))
             except OSError:
                 continue
-            return port
-    return None
+        yield port
+
+
+def free_port(first: int = PORT) -> int | None:
+    """Return the first port from `first` on that nobody listens on; None if there is none near."""
+    return next(free_ports(first), None)
+
+
+def serves(port: int, pid: int, within: float) -> bool:
+    """Tell whether process `pid` came to listen on `port`; False as soon as another one does.
+
+    Between the look for a free port and its use another process may take it, and then answers in its place.
+
+    Parameters
+    ----------
+    port
+        On 127.0.0.1.
+    pid
+        A process of this user.
+    within
+        s, the longest that a server takes to start.
+    """
+    if not _CONNECTIONS.exists():  # not Linux: nobody can tell whose it is
+        return answers(port, within)
+    clock = MonotonicClock()
+    end_ns = clock.now_ns() + int(within * 1e9)
+    while True:
+        listening = _listening(port)
+        if listening or clock.now_ns() >= end_ns or not _alive(pid):
+            return bool(listening & _sockets_of(pid))
+        pause(0.02)
+
+
+def _listening(port: int) -> set[str]:
+    """Return the sockets that listen on `port` of 127.0.0.1 or of every address, as /proc names them."""
+    rows = [line.split() for line in _CONNECTIONS.read_text(encoding="ascii").splitlines()[1:]]
+    ours = {f"{address}:{port:04X}" for address in ("0100007F", "00000000")}
+    return {f"socket:[{row[9]}]" for row in rows if row[3] == _LISTENING and row[1] in ours}
+
+
+def _sockets_of(pid: int) -> set[str]:
+    found = set()
+    with suppress(OSError):
+        for entry in Path(f"/proc/{pid}/fd").iterdir():
+            with suppress(OSError):
+                found.add(str(entry.readlink()))
+    return found
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def answers(port: int, within: float) -> bool:
@@ -98,7 +156,7 @@ def start_viewer(port: int) -> subprocess.Popen[bytes]:
         [viewer_binary(), *options],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=process_log.for_programs(),
         env=viewer_environment(),
         start_new_session=True,  # Ctrl-C ends the run, not the window
     )
@@ -122,7 +180,7 @@ def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
         [viewer_binary(), *options],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=process_log.for_programs(),
         env=viewer_environment(),
         start_new_session=True,  # Ctrl-C ends the run, which ends this
     )

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import urllib.request
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
 
+from dcmp_hil.cli.onlookers import dashboard
 from dcmp_hil.cli.viewing import attach
-from dcmp_hil.cli.watching import watched
+from dcmp_hil.cli.watching import chosen, open_browser, pages
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.rerun_sink import RerunSink
@@ -17,6 +21,8 @@ from tests.telemetry.runs import VIEW
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from dcmp_hil.telemetry.rerun_sink import Viewer
 
 _FIRST = 25_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # each process its own ports
 
@@ -26,7 +32,6 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take ports that no run on this computer takes, and no display."""
     monkeypatch.setattr(window, "PORT", _FIRST)
     monkeypatch.setattr(window, "WEB_PORT", _FIRST + 500)
-    monkeypatch.setattr(window.free_port, "__defaults__", (_FIRST,))
     monkeypatch.setattr(window.served, "__defaults__", (_FIRST,))
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
@@ -42,42 +47,80 @@ def run() -> Iterator[RerunSink]:
     sink.close()
 
 
+_LISTENS = """
+import socket, sys
+with socket.socket() as listening:
+    listening.bind(("127.0.0.1", 0))
+    listening.listen()
+    print(listening.getsockname()[1], flush=True)
+    sys.stdin.read()
+"""
+
+
+@contextmanager
+def _taken() -> Iterator[int]:
+    """Yield a port on which another process listens."""
+    with subprocess.Popen(
+        [sys.executable, "-c", _LISTENS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        yield int(other.stdout.readline())
+
+
 def said(capsys: pytest.CaptureFixture[str]) -> str:
     return " ".join(capsys.readouterr().err.split())
 
 
-def test_a_served_run_waits_for_viewers_and_says_where(capsys: pytest.CaptureFixture[str]) -> None:
-    with watched("serve") as (viewer, port):
-        assert viewer == "serve"
-        assert f"rerun --connect rerun+http://127.0.0.1:{port}/proxy" in said(capsys)
+def test_a_served_run_says_where_it_is_served_and_not_where_it_was_to_be(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with _taken() as taken:  # between the look for a free port and its use
+        free = window.free_ports(_FIRST)
+        monkeypatch.setattr(window, "free_ports", lambda _: iter([taken, next(free)]))
+        sink = dashboard(VIEW, None, "serve", taken)
+        assert f"rerun --connect rerun+http://127.0.0.1:{_FIRST}/proxy" in said(capsys)
+        assert window.speaks_http2(_FIRST, 60.0)
+        sink.close()
 
 
-@pytest.mark.parametrize("viewer", ["spawn", "connect", "none"])
-def test_other_ways_are_the_sink_s_own_business(viewer: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with watched(viewer) as (after_all, _):  # type: ignore[arg-type]
-        assert after_all == viewer
+@pytest.mark.parametrize("viewer", ["connect", "none"])
+def test_other_ways_are_the_sink_s_own_business(viewer: Viewer, capsys: pytest.CaptureFixture[str]) -> None:
+    assert chosen(viewer) == viewer
+    sink = dashboard(VIEW, None, viewer, _FIRST)
+    assert isinstance(sink, RerunSink)
+    sink.close()
     assert not said(capsys)
 
 
 @pytest.mark.parametrize("viewer", ["serve", "web"])
 def test_without_a_free_port_the_run_goes_on_unwatched(
-    viewer: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(window, "free_port", lambda *_: None)
-    with watched(viewer) as (after_all, _):  # type: ignore[arg-type]
-        assert after_all == "none"
-    assert "No port from" in said(capsys)
+    monkeypatch.setattr(window, "free_ports", lambda _: iter([]))
+    sink = dashboard(VIEW, None, viewer, _FIRST)
+    assert "No port from" in sink.warnings[0]  # type: ignore[attr-defined]
+    sink.close()
 
 
 def test_pages_are_served_on_loopback_as_long_as_the_run_lasts(capsys: pytest.CaptureFixture[str]) -> None:
-    with watched("web") as (viewer, port):
-        assert viewer == "web"
-        address = said(capsys).removeprefix("web viewer: ")
-        assert address == window.web_url(_FIRST + 500, port)
-        with urllib.request.urlopen(address, timeout=10.0) as page:  # noqa: S310 - our own
-            assert page.status == 200
-            assert b"<html" in page.read().lower()
+    sink = dashboard(VIEW, None, "web", _FIRST)
+    address = said(capsys).removeprefix("web viewer: ")
+    assert address == window.web_url(_FIRST + 500, _FIRST)
+    with urllib.request.urlopen(address, timeout=60.0) as page:  # noqa: S310 - our own
+        assert page.status == 200
+        assert b"<html" in page.read().lower()
+    sink.close()
     assert not window.answers(_FIRST + 500, 0.1)
+
+
+def test_pages_are_told_where_they_are_and_not_where_they_were_to_be(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with _taken() as taken:
+        monkeypatch.setattr(window, "free_ports", lambda _: iter([taken, _FIRST + 700]))
+        with pages(_FIRST) as address:
+            assert address == window.web_url(_FIRST + 700, _FIRST)
+    assert not said(capsys)
 
 
 def test_a_web_viewer_that_does_not_start_costs_a_sentence(
@@ -87,8 +130,7 @@ def test_a_web_viewer_that_does_not_start_costs_a_sentence(
         raise FileNotFoundError("no such program")
 
     monkeypatch.setattr(window, "start_web_viewer", missing)
-    with watched("web") as (viewer, _):
-        assert viewer == "web"  # whoever has a viewer may come
+    dashboard(VIEW, None, "web", _FIRST).close()
     assert "No web viewer (no such program); to watch: dcmp-hil view" in said(capsys)
 
 
@@ -96,9 +138,9 @@ def test_no_browser_is_a_sentence(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setattr("dcmp_hil.cli.watching.display_problem", lambda: "")
     monkeypatch.setattr("webbrowser.open", lambda _: False)
-    with watched("web"):
-        pass
+    open_browser("http://127.0.0.1")
     assert "No browser was found; open the address above in one." in said(capsys)
 
 
@@ -111,6 +153,7 @@ def test_view_finds_the_run_and_opens_a_window(
     opened: list[int] = []
     monkeypatch.setenv("DISPLAY", ":99")
     monkeypatch.setattr(window, "start_viewer", opened.append)
+    monkeypatch.setattr("dcmp_hil.cli.viewing.display_problem", lambda: "")
     attach(None, web=False)
     assert opened == [run.port]
     assert "the run goes on" in said(capsys)
@@ -118,7 +161,7 @@ def test_view_finds_the_run_and_opens_a_window(
 
 @pytest.mark.usefixtures("run")
 def test_view_without_a_display_says_what_else_there_is() -> None:
-    with pytest.raises(ConfigError, match="There is no display") as caught:
+    with pytest.raises(ConfigError, match="there is no display") as caught:
         attach(None, web=False)
     assert "Use --web" in str(caught.value)
     assert "ssh -L" in str(caught.value)

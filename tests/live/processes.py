@@ -37,7 +37,7 @@ def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subpro
 
     `first` is the first of the ports on which recordings are served, and looked for.
     """
-    ports = f"for find in (viewer.free_port, viewer.served): find.__defaults__ = ({first},)"
+    ports = f"viewer.PORT = {first}; viewer.served.__defaults__ = ({first},)"
     process = subprocess.Popen(
         [sys.executable, "-c", f"from dcmp_hil.telemetry import viewer\n{ports}\n{_MAIN}", *arguments],
         cwd=folder,
@@ -64,11 +64,12 @@ def until(done: Callable[[], object], what: str, within: float = BOUND) -> None:
 
 def until_running(process: subprocess.Popen[str]) -> None:
     """Wait until a run has full authority."""
-    until(lambda: process.poll() is not None or _runs(process.pid), "the run got under way")
+    until(lambda: process.poll() is not None or runs(process.pid), "the run got under way")
     assert process.poll() is None, process.communicate()[1]
 
 
-def _runs(pid: int) -> bool:
+def runs(pid: int) -> bool:
+    """Tell whether a run has full authority."""
     try:
         return bool(status(pid).get("phase") == "running")
     except ConfigError:

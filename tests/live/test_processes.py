@@ -118,11 +118,14 @@ def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
 
 def test_run_says_why_nobody_listens_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
     places.folder().chmod(0o755)
-    with started(tmp_path, *_RUN[:-4], "--duration", "3") as run:
-        _, err = run.communicate(timeout=BOUND)
+    with started(tmp_path, *_RUN) as run:
+        assert run.stderr is not None
+        said = run.stderr.readline()
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=BOUND)
     assert run.returncode == 0
-    assert "The control process ended" in err
-    assert "is no folder of yours alone" in err
+    assert "The control process ended" in said
+    assert "is no folder of yours alone" in said
 
 
 def test_nobody_listens_when_that_is_wanted(tmp_path: Path) -> None:

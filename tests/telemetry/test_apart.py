@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -273,6 +274,58 @@ def test_a_process_that_does_not_come_up_is_told_of_and_the_run_goes_on(
     assert result.summary.periods == 300  # worked out from the ring, at the end
     assert "did not come up" in told[0]
     assert "did not come up" in result.troubles[0]
+
+
+class Leaves(Notes):
+    """A sink that ends its process."""
+
+    def __init__(self) -> None:
+        os._exit(7)
+
+
+class Busy(Notes):
+    """A sink that holds the interpreter lock of its process for longer than an idle one is waited for."""
+
+    def __init__(self) -> None:
+        """Note nothing."""
+
+    def block(self, block: Block) -> None:  # noqa: ARG002
+        """Have everybody else in the process wait, as on a slow computer: C code gives nothing away."""
+        sum(range(150_000_000))
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def test_a_process_that_ends_at_once_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_COMING_UP", 1e6)  # never
+    result = run(bench(), duration=0.2, sinks=[partial(Leaves)])
+    assert result.summary.periods == 200
+    assert "did not come up" in result.troubles[0]
+
+
+def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_COMING_UP", 1e6)
+    monkeypatch.setattr(module, "_SLOW", 0.3)
+    told: list[str] = []
+    apart = Apart(Statistics(_T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append)
+    apart.open(lambda: bool(told))
+    assert apart.pid is None
+    apart.close()
+    assert told == ["The telemetry process is still starting after 0.3 s; Ctrl-C ends this."]
+
+
+def test_a_process_that_works_at_its_figures_is_waited_for() -> None:
+    told: list[str] = []
+    apart = Apart(Statistics(_T), keep=True, sinks=[pickle.dumps(partial(Busy))], warn=told.append)
+    apart.open()
+    fill(apart, 100)
+    pid = apart.pid
+    assert pid is not None
+    apart.close()
+    os.waitpid(pid, 0)  # its sink is still at work
+    assert len(apart.figures.columns()["time_s"]) == 100
+    assert not told
 
 
 def test_a_python_that_is_not_there_is_told_of_and_the_run_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.clock import pause
+from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
@@ -62,6 +63,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[RerunSink]:
     """Yield a sink that serves a live recording, its window replaced by nothing."""
     monkeypatch.setenv("DISPLAY", ":99")
     monkeypatch.setattr(window, "start_viewer", lambda _: OpenWindow())
+    monkeypatch.setattr(rerun_sink, "display_problem", lambda: "")
     sink = RerunSink(VIEW, None, "spawn", port=23_000)
     yield sink
     sink.close()

@@ -15,6 +15,7 @@ from dcmp_hil.telemetry.outlet import Outlet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 
 class Stream:
@@ -72,6 +73,44 @@ def test_a_stream_that_cannot_be_flushed_is_left_as_it_is() -> None:
     stream = Stream(full=True)
     outlet(stream).close(10.0)
     assert stream.done == []
+
+
+def test_a_file_that_does_not_grow_is_told_of_with_what_was_measured(
+    gate: threading.Event, tmp_path: Path
+) -> None:
+    way = Outlet(Stream(), 1.0, 0.3, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
+    way.do(lambda _: gate.wait())  # type: ignore[arg-type]
+    with pytest.raises(TimeoutError, match=r"it did not grow for \d+\.\d s"):
+        way.close(60.0)
+
+
+def test_a_file_that_cannot_grow_is_not_waited_for(
+    gate: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_FULL_STALL", 0.1)
+    monkeypatch.setattr(module, "room_for", lambda _: 0)
+    way = Outlet(Stream(), 1.0, 60.0, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
+    way.do(lambda _: gate.wait())  # type: ignore[arg-type]
+    with pytest.raises(TimeoutError, match=r"it did not grow for"):
+        way.close(60.0)
+
+
+def test_a_file_that_grows_slowly_is_waited_for(
+    gate: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_FULL_STALL", 60.0)
+    file = tmp_path / "run.rrd"
+
+    def slowly(_: object) -> None:
+        for _ in range(10):
+            with file.open("ab") as growing:
+                growing.write(b"x")
+            gate.wait(0.05)
+
+    way = Outlet(Stream(), 1.0, 60.0, file=file)  # type: ignore[arg-type]
+    way.do(slowly)
+    way.close(60.0)
+    assert file.stat().st_size == 10
 
 
 def test_what_a_job_raised_reaches_whoever_comes_next() -> None:
