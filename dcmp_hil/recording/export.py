@@ -45,21 +45,22 @@ def to_parquet(run: RecordedRun, path: Path) -> None:
     """Write every signal as a column of doubles, and what the run was as metadata of the file."""
     pyarrow: Any = import_module("pyarrow")  # neither has types
     parquet: Any = import_module("pyarrow.parquet")
-    with _writing(path):
-        table = pyarrow.table(run.columns)
-        parquet.write_table(table.replace_schema_metadata(run.run), path)
+    table = pyarrow.table(run.columns)
+    with _writing(path), path.open("wb") as file:  # given a path, pyarrow removes it where it cannot write
+        parquet.write_table(table.replace_schema_metadata(run.run), file)
 
 
 def to_rrd(run: RecordedRun, path: Path) -> None:
     """Write the dashboard of the run."""
     from dcmp_hil.telemetry.rerun_sink import RerunSink
 
-    sink = RerunSink(view_of(run.rig), path, "none")
-    for event in run.events:
-        sink.event(event)
-    for first in range(0, len(run.rows), _ROWS):
-        sink.block(Block(run.rows[first : first + _ROWS], run.rig.model.values()))
-    sink.close()
+    with _writing(path):
+        sink = RerunSink(view_of(run.rig), path, "none")
+        for event in run.events:
+            sink.event(event)
+        for first in range(0, len(run.rows), _ROWS):
+            sink.block(Block(run.rows[first : first + _ROWS], run.rig.model.values()))
+        sink.close()
 
 
 def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
@@ -94,3 +95,5 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
+    except RuntimeError as error:  # Rerun's, of a disk that is full
+        raise ConfigError(f"{path}: {error}") from None

@@ -58,14 +58,17 @@ def write_series(
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
     layout = opened(rrb.Vertical(*(plot(name, window=None) for name in plots)), follow=False)
     stream = rr.RecordingStream(application)
-    stream.set_sinks(rr.FileSink(path), default_blueprint=layout)
-    stream.send_blueprint(layout)
-    stream.send_recording_name(path.stem)
     times = [rr.TimeColumn(TIMELINE, duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
-    for name, lines in plots.items():
-        _send(stream, name, times, {k: v for k, v in lines.items() if not np.isnan(v).all()})
-    stream.flush(timeout_sec=_FLUSH)
-    stream.disconnect()
+    try:
+        stream.set_sinks(rr.FileSink(path), default_blueprint=layout)
+        stream.send_blueprint(layout)
+        stream.send_recording_name(path.stem)
+        for name, lines in plots.items():
+            _send(stream, name, times, {k: v for k, v in lines.items() if not np.isnan(v).all()})
+        stream.flush(timeout_sec=_FLUSH)
+        stream.disconnect()
+    except RuntimeError as error:  # a file that can be opened, on a disk that is full
+        raise ConfigError(f"{path}: {error}. Free some space, or choose another disk.") from None
 
 
 def _send(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -14,12 +15,10 @@ import pytest
 
 from dcmp_hil.cli.outputs import try_folder, try_places, write_text
 from dcmp_hil.errors import ConfigError
-from tests.installed import environment
+from tests.installed import Finished, environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from tests.installed import Finished
 
     Script = Callable[..., Finished]
 
@@ -157,6 +156,46 @@ def test_current_folder_that_is_gone_is_told_in_a_line(installed: Path, tmp_path
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
+
+
+def limited(installed: Path, folder: Path, *arguments: str) -> Finished:
+    """Run the script where no file may grow beyond 8 kB, which a program meets like a disk that is full."""
+    done = subprocess.run(
+        ["sh", "-c", 'ulimit -f 16 && exec "$0" "$@"', str(installed), *arguments],
+        cwd=folder,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=BOUND,
+        check=False,
+    )
+    return Finished(done.returncode, done.stdout, done.stderr)
+
+
+def test_disk_that_fills_up_is_told_for_each_file_after_the_figures(
+    script: Script, installed: Path, tmp_path: Path
+) -> None:
+    rows = (f"{k * 1e-3},{0.1 * math.sin(k * 5e-3)},0.1" for k in range(1500))
+    (tmp_path / "run.csv").write_text("\n".join(["time_s,position_rad,voltage_V", *rows]) + "\n")
+    replay = limited(installed, tmp_path, "replay", "run.csv")
+    assert replay.code == 2
+    assert "velocity error, RMS" in replay.out
+    assert [line.split(":")[1] for line in replay.err.splitlines() if line.startswith("error: ")] == [
+        " run-replay.csv",
+        " run-replay.rrd",
+    ]
+    run = script("run", "--fast", "--duration", "1", "--viewer", "none", "--json", "/dev/full")
+    assert run.code == 0
+    assert "velocity error" in run.out
+    assert run.err.count("warning: --json /dev/full: No space left on device.") == 1
+    (folder,) = (tmp_path / "runs").iterdir()
+    (tmp_path / "old").touch()
+    export = limited(installed, tmp_path, "export", str(folder), "--csv", "csv", "--parquet", "old")
+    assert (export.code, export.out) == (2, "")
+    assert export.err.count("File too large") == export.err.count("\n") == 2
+    assert (tmp_path / "old").exists()  # pyarrow removes what it cannot write to
+    assert "Traceback" not in run.err + export.err + replay.err
 
 
 def test_trip_stays_the_end_of_a_run_whose_json_cannot_be_written(installed: Path, tmp_path: Path) -> None:
