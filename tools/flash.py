@@ -31,6 +31,8 @@ INSTALL = {
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
 _BOOTLOADER_BAUD = 115_200
+_DAC_V = 10.0  # V, full scale unless it is said
+_SUPPLY_V = (1.0, 100.0)  # V
 _NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
 
 
@@ -41,7 +43,14 @@ class Piece(NamedTuple):
     address: int
 
 
-def record_of(rig: Rig, board: str, *, zero_code: int, full_scale_V: float) -> bytes:
+def record_of(
+    rig: Rig,
+    board: str,
+    *,
+    zero_code: int = 2048,
+    full_scale_V: float | None = None,
+    supply_V: float | None = None,
+) -> bytes:
     """Return the record of a board that fits a rig.
 
     Parameters
@@ -49,29 +58,57 @@ def record_of(rig: Rig, board: str, *, zero_code: int, full_scale_V: float) -> b
     zero_code
         The DAC's code at which the amplifier puts out 0 V.
     full_scale_V
-        V, that 2048 codes more put out; of a PWM board: the motor's supply.
+        V, that 2048 codes of a DAC more put out; None is 10.
+    supply_V
+        V, the motor's supply, of which a PWM board puts out a part. No other board has it, and no rig's key
+        `amplifier.supply_V` may say otherwise.
 
     Raises
     ------
     ConfigError
-        If the rig is not one for a device, or asks for more than the board can put out.
+        If the rig is not one for a device, asks for more than the board can put out, or the supply is not
+        known or not the rig's.
     """
     kind = rig.backend.kind
     if kind not in ("serial", "can"):
         raise ConfigError(
             f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
         )
+    full_scale = _full_scale(rig, board, full_scale_V, supply_V)
     config = board_config(rig, _NUMBERS[board])
-    full_scale_mV = round(1e3 * full_scale_V)
+    full_scale_mV = round(1e3 * full_scale)
     if config["voltage_limit_mV"] > full_scale_mV:
         raise ConfigError(
             f"amplifier.voltage_limit_V: got {1e-3 * config['voltage_limit_mV']:g}; expected "
-            f"{full_scale_V:g} V or less, the board's full scale. Lower it, or say --full-scale-V."
+            f"{full_scale:g} V or less, the board's full scale. Lower it, or say --full-scale-V."
         )
     slcan = getattr(rig.backend, "interface", "") == "slcan"
     link = RecordLink.cobs if kind == "serial" else RecordLink.slcan if slcan else RecordLink.can
     baud = getattr(rig.backend, "baud", None) or getattr(rig.backend, "tty_baud", None) or 1_000_000
     return record(config, link=link, baud=baud, zero_code=zero_code, full_scale_mV=full_scale_mV)
+
+
+def _full_scale(rig: Rig, board: str, full_scale_V: float | None, supply_V: float | None) -> float:
+    """Return what the board puts out at most, V: of a PWM board it is the supply, and nothing is assumed."""
+    rig_supply = rig.amplifier.supply_V
+    if not board.endswith("_pwm"):
+        if supply_V is not None or rig_supply != "none":
+            where = "--supply-V" if supply_V is not None else "amplifier.supply_V"
+            raise ConfigError(f"{where}: {board} divides no supply. Leave it out; see --full-scale-V.")
+        return _DAC_V if full_scale_V is None else full_scale_V
+    if full_scale_V is not None:
+        raise ConfigError(f"--full-scale-V: the full scale of {board} is the motor's supply. Say --supply-V.")
+    if supply_V is None or not _SUPPLY_V[0] <= supply_V <= _SUPPLY_V[1]:
+        raise ConfigError(
+            f"--supply-V: got {supply_V}; {board} puts out a part of the motor's supply, and every limit is "
+            "wrong by the factor by which this number is. Measure the supply, and say it: --supply-V 24."
+        )
+    if rig_supply != supply_V:
+        raise ConfigError(
+            f"amplifier.supply_V: the rig says {rig_supply}, --supply-V {supply_V:g}. Write the measured one "
+            "into the rig: every run compares it with the board."
+        )
+    return supply_V
 
 
 def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
@@ -89,7 +126,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("board", choices=BOARDS)
     parser.add_argument("rig", help="whose limits and link the board is to have: a name, or a rig.toml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets")
-    parser.add_argument("--full-scale-V", type=float, default=10.0, dest="full_scale_V", help="default: 10")
+    parser.add_argument("--full-scale-V", type=float, dest="full_scale_V", help="of a DAC (default: 10)")
+    parser.add_argument(
+        "--supply-V", type=float, dest="supply_V", help="the motor's supply, measured; a PWM board needs it"
+    )
     parser.add_argument("--zero-code", type=int, default=2048, help="of the DAC (default: 2048)")
     parser.add_argument("--by", choices=tuple(INSTALL), default="stm32flash")
     parser.add_argument("--port", default="/dev/ttyUSB0", help="of the boot loader (default: /dev/ttyUSB0)")
@@ -104,7 +144,13 @@ def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
     if asked.only != "program":
         rig = load_rig(asked.rig, asked.sets)
         kept = folder / "record.bin"
-        made = record_of(rig, asked.board, zero_code=asked.zero_code, full_scale_V=asked.full_scale_V)
+        made = record_of(
+            rig,
+            asked.board,
+            zero_code=asked.zero_code,
+            full_scale_V=asked.full_scale_V,
+            supply_V=asked.supply_V,
+        )
         kept.write_bytes(image(made))
         pieces.append(Piece(kept, ADDRESS))
     if asked.only != "record":

@@ -28,6 +28,7 @@ RANGES = {
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
     Parameter.LAST_FAULT_DETAIL: (-_INT - 1, _INT),
+    Parameter.SUPPLY_MV: (0, _INT),
 }
 """What a value can be at all, both ends included."""
 COMPARED = (
@@ -37,6 +38,7 @@ COMPARED = (
     Parameter.SLEW_MV_PER_MS,
     Parameter.SPEED_LIMIT_COUNTS_S,
     Parameter.TRAVEL_LIMIT_COUNTS,
+    Parameter.SUPPLY_MV,
 )
 
 
@@ -83,7 +85,25 @@ def _same(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
             "Correct the rig, or build the firmware for this rate."
         )
         * (rate_hz != asked_hz),
+        _supply(terms.supply_mV, device[Parameter.SUPPLY_MV]),
     ]
+
+
+def _supply(asked_mV: int, found_mV: int) -> str:
+    """Say where rig and board have different supplies: every voltage is wrong by their ratio."""
+    if found_mV == asked_mV:
+        return ""
+    rig = f"{1e-3 * asked_mV:g}" if asked_mV else '"none"'
+    if not found_mV:
+        return (
+            f"amplifier.supply_V: the rig says {rig}, but this board divides no supply: its amplifier is "
+            'told a voltage. Take the key out of the rig, or write "none".'
+        )
+    return (
+        f"amplifier.supply_V: the rig says {rig}, the board puts out a part of a supply that it takes for "
+        f"{1e-3 * found_mV:g} V (PWM). Measure the motor's supply. If the board is right, write that into "
+        "the rig; if not, flash its record anew with --supply-V."
+    )
 
 
 def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:

@@ -37,6 +37,8 @@ class Terms:
         rad, signed by the encoder's wiring.
     mV_per_V
         1000, signed by the amplifier's wiring.
+    supply_mV
+        mV, of the motor, where the board divides it; must be the device's own. 0 where it does not.
     zero
         Count at which the arm hangs; None for where it is at the start.
     velocity_limit, position_limit
@@ -55,6 +57,7 @@ class Terms:
     watchdog_ms: int
     rad_per_count: float
     mV_per_V: float
+    supply_mV: int
     zero: int | None
     velocity_limit: float | None
     position_limit: float | None
@@ -87,6 +90,7 @@ class Terms:
             watchdog_ms=device.watchdog_ms,
             rad_per_count=rig.encoder.sign * math.tau / counts,
             mV_per_V=1e3 * rig.amplifier.sign,
+            supply_mV=rig.amplifier.supply_mV,
             zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
             velocity_limit=limits.velocity_limit_rad_s if watched else None,
             position_limit=limits.position_limit_rad if watched else None,

@@ -145,6 +145,16 @@ def _motor_holds(rig: Rig) -> str:
     )
 
 
+def _supply_gives_limit(rig: Rig) -> str:
+    limit, supply = rig.amplifier.limit, 1e-3 * rig.amplifier.supply_mV
+    if supply == 0.0 or math.isinf(limit) or limit <= supply:
+        return ""
+    return (
+        f"amplifier.voltage_limit_V: got {number(limit)}, more than amplifier.supply_V = {number(supply)} "
+        "gives. Lower it, or correct the supply."
+    )
+
+
 def _within_reason(rig: Rig) -> str:
     """Refuse what only a wrong unit explains, in the tables that do not say how large their keys may be."""
     sections: dict[str, Section] = {
@@ -191,6 +201,7 @@ RULES: tuple[Callable[[Rig], str], ...] = (
     _simulation_only,
     _whole_units,
     _link_carries_rate,
+    _supply_gives_limit,
     _encoder_shows_faults,
     _limits_leave_room,
     _motor_holds,

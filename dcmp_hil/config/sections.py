@@ -54,6 +54,13 @@ class AmplifierSection(Section):
 
     sign: Literal[1, -1] = 1
     """-1 if a positive voltage lowers the arm."""
+    supply_V: Annotated[float, Field(ge=1, le=100)] | Literal["none"] = "none"
+    """The motor's supply, V, where the board divides it (PWM); "none": the amplifier is told a voltage."""
+
+    @property
+    def supply_mV(self) -> int:
+        """The motor's supply, mV; 0 where none is divided."""
+        return 0 if self.supply_V == "none" else round(1e3 * self.supply_V)
 
     @property
     def limit(self) -> float:

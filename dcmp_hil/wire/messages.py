@@ -40,6 +40,7 @@ class Parameter(IntEnum):
     EDGE_STAMPS = 12
     LAST_FAULT = 13
     LAST_FAULT_DETAIL = 14
+    SUPPLY_MV = 15
 
 
 class Result(IntEnum):

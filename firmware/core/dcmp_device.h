@@ -26,6 +26,7 @@ struct dcmp_config {
     int32_t travel_limit_counts;   /* 1.. */
     int32_t last_fault;            /* before this boot, as in FAULT; 0 for none that is known */
     int32_t last_fault_detail;
+    int32_t supply_mV;             /* 0..: the motor's supply, where the amplifier divides it; 0 where it does not */
     uint16_t firmware_version;     /* major * 256 + minor */
     uint8_t node;                  /* 0..15 */
     bool edge_stamps;              /* the board can time-stamp edges */

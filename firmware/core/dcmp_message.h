@@ -51,7 +51,8 @@ enum dcmp_parameter {
     DCMP_TRAVEL_LIMIT_COUNTS,
     DCMP_EDGE_STAMPS,
     DCMP_LAST_FAULT,
-    DCMP_LAST_FAULT_DETAIL
+    DCMP_LAST_FAULT_DETAIL,
+    DCMP_SUPPLY_MV
 };
 
 /* In the order in which they are looked for: the first that applies is answered. */

@@ -19,6 +19,7 @@ bool dcmp_config_valid(const struct dcmp_config *config)
         within(config->watchdog_ms, DCMP_WATCHDOG_MIN_MS, DCMP_WATCHDOG_MAX_MS),
         within(config->speed_limit_counts_s, 1, INT32_MAX),
         within(config->travel_limit_counts, 1, INT32_MAX),
+        within(config->supply_mV, 0, INT32_MAX),
         within(config->node, 0, NODE_MAX),
     };
     bool valid = true;
@@ -53,6 +54,7 @@ void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_
     parameters->value[DCMP_TRAVEL_LIMIT_COUNTS] = config->travel_limit_counts;
     parameters->value[DCMP_LAST_FAULT] = config->last_fault;
     parameters->value[DCMP_LAST_FAULT_DETAIL] = config->last_fault_detail;
+    parameters->value[DCMP_SUPPLY_MV] = config->supply_mV;
     settable(parameters, DCMP_VOLTAGE_LIMIT_MV, 1, config->voltage_limit_mV);
     settable(parameters, DCMP_SLEW_MV_PER_MS, 1, config->slew_mV_per_ms == 0 ? INT32_MAX : config->slew_mV_per_ms);
     settable(parameters, DCMP_WATCHDOG_MS, DCMP_WATCHDOG_MIN_MS, DCMP_WATCHDOG_MAX_MS);

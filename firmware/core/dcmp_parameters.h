@@ -8,7 +8,7 @@
 #include "dcmp_device.h"
 #include "dcmp_message.h"
 
-#define DCMP_PARAMETER_SLOTS 15u /* numbers from 1 on */
+#define DCMP_PARAMETER_SLOTS 16u /* numbers from 1 on */
 #define DCMP_WATCHDOG_MIN_MS 5
 #define DCMP_WATCHDOG_MAX_MS 50
 

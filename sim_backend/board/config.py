@@ -18,7 +18,7 @@ _REV_S, _REV = 8, 4  # the board's own limits: revolutions a second, revolutions
 _MOST_MV = 32_767  # what the wire can say
 
 
-LAYOUT = struct.Struct("@12iHB?")
+LAYOUT = struct.Struct("@13iHB?")
 """Of `struct dcmp_config`: the values of `board_config`, in their order."""
 
 
@@ -51,6 +51,7 @@ def board_config(rig: Rig, board: int) -> dict[str, int]:
         "travel_limit_counts": _REV * counts,
         "last_fault": 0,
         "last_fault_detail": 0,
+        "supply_mV": rig.amplifier.supply_mV,
         "firmware_version": VERSION,
         "node": getattr(rig.backend, "node", 0),
         "edge_stamps": 0,

@@ -25,10 +25,11 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
             "amplifier.sign=-1",
             "amplifier.voltage_limit_V=4.5",
             "amplifier.slew_V_s=250",
+            "amplifier.supply_V=24",
         )
     )
     assert terms == Terms(
-        3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, -7, 20.0, 6.2832, 3.0, 0.005, 0.005
+        3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, 24_000, -7, 20.0, 6.2832, 3.0, 0.005, 0.005
     )
 
 

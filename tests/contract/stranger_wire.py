@@ -23,7 +23,7 @@ HOST_SILENT, LINK_DOWN, STOPPED, CORRUPT_LINK, OVER_SPEED, OVER_TRAVEL, ENCODER_
 OK, UNKNOWN, READ_ONLY, OUT_OF_RANGE, NOT_IDLE, NOT_OWNER = range(6)
 BOARD, BOOT_COUNT, RESET_CAUSE, TICK, COUNTS_PER_REV, PERIOD_US = range(1, 7)
 VOLTAGE_LIMIT, SLEW, WATCHDOG, SPEED_LIMIT, TRAVEL_LIMIT, EDGE_STAMPS = range(7, 13)
-LAST_FAULT, LAST_FAULT_DETAIL = 13, 14
+LAST_FAULT, LAST_FAULT_DETAIL, SUPPLY = 13, 14, 15
 
 LARGEST = 2**31 - 1
 COBS_LONGEST = 13
@@ -214,7 +214,7 @@ class Parameters:
     def __init__(self, limits: dict[int, int], facts: dict[int, int]) -> None:
         self._built = limits | {EDGE_STAMPS: 0}
         self.now = (
-            {BOARD: 1, BOOT_COUNT: 0, RESET_CAUSE: 0, TICK: 0, LAST_FAULT: 0, LAST_FAULT_DETAIL: 0}
+            {BOARD: 1, BOOT_COUNT: 0, RESET_CAUSE: 0, TICK: 0, LAST_FAULT: 0, LAST_FAULT_DETAIL: 0, SUPPLY: 0}
             | self._built
             | facts
         )

@@ -72,6 +72,7 @@ _IMPOSSIBLE = [
     *((Parameter.SLEW_MV_PER_MS, value) for value in (-1, -(2**31))),
     *((Parameter.SPEED_LIMIT_COUNTS_S, value) for value in (0, -1, -(2**31))),
     *((Parameter.TRAVEL_LIMIT_COUNTS, value) for value in (0, -1, -(2**31))),
+    *((Parameter.SUPPLY_MV, value) for value in (-1, -(2**31))),
     *((Parameter.TICK, value) for value in (-1, -(2**31))),
 ]
 _READ = sorted({parameter for parameter, _ in _IMPOSSIBLE})
@@ -137,6 +138,30 @@ def test_limits_below_the_rigs_are_named_before_arming(parameter: Parameter, val
         assert "Lower it in the rig" in str(caught.value)
         assert bench.board.state == State.IDLE
         assert bench.board.owner == 0
+
+
+@pytest.mark.parametrize(
+    ("rig", "device_mV", "words"),
+    [
+        ("none", 24_000, r'amplifier\.supply_V: the rig says "none", .* 24 V \(PWM\).*--supply-V'),
+        ("10.0", 24_000, r"amplifier\.supply_V: the rig says 10, .* 24 V \(PWM\)"),
+        ("24.0", 12_500, r"amplifier\.supply_V: the rig says 24, .* 12\.5 V \(PWM\)"),
+        ("24.0", 0, r'amplifier\.supply_V: the rig says 24, but this board divides no supply.*"none"'),
+    ],
+)
+def test_another_supply_than_the_rigs_is_named_before_arming(rig: str, device_mV: int, words: str) -> None:
+    with on_bench("sim-board can", f"amplifier.supply_V={rig}") as bench:
+        on_way_down(bench, lying(says(Parameter.SUPPLY_MV, device_mV)))
+        with pytest.raises(ConfigError, match=words):
+            bench.make().__enter__()
+        assert bench.board.state == State.IDLE
+        assert bench.board.owner == 0
+
+
+def test_the_same_supply_on_both_sides_arms() -> None:
+    with on_bench("sim-board can", "amplifier.supply_V=24.0") as bench, bench.make() as backend:
+        drive(backend, 0.0, 3)
+        assert bench.board.state == State.RUN
 
 
 def test_a_limit_of_the_rig_as_the_message_prints_it_is_accepted() -> None:

@@ -29,6 +29,7 @@ CONFIG = {
     "travel_limit_counts": 20000,
     "last_fault": 5,
     "last_fault_detail": -41234,
+    "supply_mV": 24000,
     "firmware_version": 0x0102,
     "node": 0,
     "edge_stamps": True,

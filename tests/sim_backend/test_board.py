@@ -228,7 +228,10 @@ def test_counters_that_wrap_change_nothing(of_board: dict[str, int]) -> None:
 
 
 def test_configuration_is_what_the_parameters_say() -> None:
-    host = Host("amplifier.slew_V_s=700.0", "loop.rate_hz=500.0", "encoder.counts_per_rev=2000.0")
+    host = Host(
+        *("amplifier.slew_V_s=700.0", "amplifier.supply_V=24.0"),
+        *("loop.rate_hz=500.0", "encoder.counts_per_rev=2000.0"),
+    )
     config = board_config(host.rig, 1)
     host.tick()
     got = {
@@ -238,7 +241,8 @@ def test_configuration_is_what_the_parameters_say() -> None:
     assert got["counts_per_rev"] == 2000
     assert got["period_us"] == 2000
     assert got["slew_mV_per_ms"] == 700
-    assert len(got) == 13
+    assert got["supply_mV"] == 24_000
+    assert len(got) == 14
 
 
 def test_number_on_the_bus_is_that_of_the_rig() -> None:

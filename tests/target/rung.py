@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.config import change_rig
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import ParameterGet, ParameterValue, SampleReport, State
@@ -62,9 +63,14 @@ class Rung:
 
 
 @contextmanager
-def rung(f405: Path, carrier: str = "cobs", *, kind: str = "dac", **options: object) -> Iterator[Rung]:
-    """Arm a board over a carrier."""
+def rung(
+    f405: Path, carrier: str = "cobs", *, kind: str = "dac", supply_V: float = 10.0, **options: object
+) -> Iterator[Rung]:
+    """Arm a board over a carrier; a PWM board has a supply."""
     rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *STILL)
+    if kind == "pwm":
+        rig = change_rig(rig, [f"amplifier.supply_V={supply_V}"])
+        options.setdefault("supply_mV", 1e3 * supply_V)
     board = TargetBoard(f405 / f"bench_f405_{kind}.elf", rig, carrier, **options)
     host = SimBoardBackend(rig, SimulatedClock(), board)  # type: ignore[arg-type]
     host.__enter__()

@@ -8,13 +8,15 @@ import pytest
 
 from dcmp_hil.backends import open_backend
 from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.wire.messages import Parameter
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board
 from tests.contract.benches import PatientClock, pumped
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
-from tests.target.machine.system import STACK_TOP_OF_BOARD
-from tests.target.rung import CARRIERS, COUNT_RAD, CYCLES_A_MS, STILL, TICK_IRQ, rung, sine
+from tests.target.machine.system import STACK_TOP_OF_BOARD, System
+from tests.target.rung import CARRIERS, COUNT_RAD, CYCLES_A_MS, STILL, TICK_IRQ, rung, said_of, sine
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,6 +131,30 @@ def test_nothing_reaches_the_motor_before_it_is_armed(f405: Path, kind: str, car
         assert armed > 10_000.0  # the tenth DRIVE
         target.drive(3)
         assert target.system.amplifier_mV == pytest.approx(1000.0, abs=5.0)
+
+
+def test_limits_are_true_at_a_supply_of_24_V(f405: Path) -> None:
+    with rung(f405, kind="pwm", supply_V=24.0) as target:
+        for volts in (-2.5, 10.0, 50.0):
+            target.drive(3, lambda *_, volts=volts: volts)
+            limited = 1e3 * min(10.0, volts)
+            assert target.system.amplifier_mV == pytest.approx(limited, abs=10.0)
+
+
+def test_board_that_takes_another_supply_for_the_motors_is_not_armed(f405: Path) -> None:
+    rig = bench("backend.kind=sim-board", "amplifier.supply_V=24.0")
+    board = TargetBoard(f405 / "bench_f405_pwm.elf", rig)
+    for other, says in (("10.0", "says 10, .* 24 V"), ("none", 'says "none", .* 24 V')):
+        wrong = bench("backend.kind=sim-board", f"amplifier.supply_V={other}")
+        with pytest.raises(ConfigError, match=rf"amplifier\.supply_V: the rig {says}"):
+            SimBoardBackend(wrong, SimulatedClock(), board).__enter__()  # type: ignore[arg-type]
+    assert not any(on for _, on, _ in board.system.pins_seen)
+
+
+def test_board_without_a_record_never_puts_out_more_than_is_asked_for(f405: Path) -> None:
+    system = System(f405 / "bench_f405_pwm.elf", b"", supply_mV=100_000.0)
+    system.run_for(20_000.0)
+    assert said_of(system, Parameter.SUPPLY_MV) == 100_000
 
 
 def test_bridge_turns_either_way(f405: Path) -> None:

@@ -59,6 +59,42 @@ def test_record_refuses_a_rig_without_a_device() -> None:
         record_of(load_rig("bench-1khz"), DAC, zero_code=2048, full_scale_V=10.0)
 
 
+PWM = "bench_f405_pwm"
+
+
+def test_pwm_board_is_given_the_supply_that_was_said_and_that_the_rig_has() -> None:
+    rig = load_rig("bench-serial", ["amplifier.supply_V=24"])
+    assert word(record_of(rig, PWM, supply_V=24.0), FULL_AT) == 24_000
+
+
+@pytest.mark.parametrize(
+    ("board", "rig", "said", "words"),
+    [
+        (PWM, [], {}, r"--supply-V: got None; .*Measure the supply.*--supply-V 24"),
+        (PWM, [], {"supply_V": 0.0}, r"--supply-V: got 0\.0"),
+        (PWM, [], {"supply_V": float("nan")}, r"--supply-V: got nan"),
+        (PWM, [], {"supply_V": 24.0}, r"amplifier\.supply_V: the rig says none, --supply-V 24\. Write"),
+        (PWM, ["amplifier.supply_V=12"], {"supply_V": 24.0}, r"the rig says 12.*, --supply-V 24"),
+        (PWM, [], {"full_scale_V": 10.0}, r"--full-scale-V: .*Say --supply-V"),
+        (DAC, [], {"supply_V": 24.0}, r"--supply-V: bench_f405_dac divides no supply"),
+        (DAC, ["amplifier.supply_V=24"], {}, r"amplifier\.supply_V: bench_f405_dac divides no supply"),
+    ],
+)
+def test_supply_that_is_not_known_or_not_the_rigs_is_refused(
+    board: str, rig: list[str], said: dict[str, float], words: str
+) -> None:
+    with pytest.raises(ConfigError, match=words):
+        record_of(load_rig("bench-serial", rig), board, **said)  # type: ignore[arg-type]
+
+
+def test_pwm_board_without_its_supply_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, PWM, "bench-serial", "--only", "record", "--dry-run") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: --supply-V: ")
+
+
 def test_record_fills_its_two_sectors_and_no_more() -> None:
     made = image(record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=10.0))
     assert ADDRESS + len(made) == CODE

@@ -13,10 +13,11 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 _LARGEST = 2**31 - 1
-_UNKNOWN = (0, 15, 100, 255)
+_UNKNOWN = (0, 16, 100, 255)
 _READ_ONLY = (
     *(Parameter.BOARD, Parameter.BOOT_COUNT, Parameter.RESET_CAUSE, Parameter.TICK),
     *(Parameter.COUNTS_PER_REV, Parameter.PERIOD_US, Parameter.LAST_FAULT, Parameter.LAST_FAULT_DETAIL),
+    Parameter.SUPPLY_MV,
 )
 _LIMITS = (
     Parameter.VOLTAGE_LIMIT_MV,
@@ -37,6 +38,7 @@ _RANGES = {
     Parameter.TRAVEL_LIMIT_COUNTS: (1, _LARGEST),
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
+    Parameter.SUPPLY_MV: (0, _LARGEST),
 }
 
 

@@ -233,7 +233,7 @@ static void start(void)
 {
     board.clock = clock_start(BOARD_CRYSTAL_HZ);
     timebase_start(board.clock.apb1_timers_Hz);
-    board.settings = settings_read(BOARD_NUMBER, reset_take_cause());
+    board.settings = settings_read(BOARD_NUMBER, reset_take_cause(), amplifier_divides_supply());
     settings_count_boot(&board.settings);
     if (board.clock.source != CLOCK_CRYSTAL) {
         board.settings.failure |= APP_NO_CRYSTAL;

@@ -12,6 +12,7 @@
 #define BAUD_MIN 9600u
 #define BAUD_MAX 2000000u
 #define CODE_MAX 4095
+#define SUPPLY_MAX_MV 100000
 
 /* Of a board that nobody has told anything: weak, and in FAULT until somebody clears it. */
 static const struct record unknown = {
@@ -27,7 +28,8 @@ static const struct record unknown = {
     .full_scale_mV = 10000,
 };
 
-static struct settings from_record(const struct record *record, int32_t board, int32_t reset_cause)
+static struct settings from_record(const struct record *record, int32_t board, int32_t reset_cause,
+                                   bool divides_supply)
 {
     const struct settings settings = {
         .config =
@@ -42,6 +44,7 @@ static struct settings from_record(const struct record *record, int32_t board, i
                 .watchdog_ms = record->watchdog_ms,
                 .speed_limit_counts_s = record->speed_limit_counts_s,
                 .travel_limit_counts = record->travel_limit_counts,
+                .supply_mV = divides_supply ? record->full_scale_mV : 0,
                 .firmware_version = VERSION,
                 .node = (uint8_t)record->node,
                 .edge_stamps = true,
@@ -70,16 +73,20 @@ static const struct record *newest(void)
     return record_newest(sectors, PLACES);
 }
 
-struct settings settings_read(int32_t board, int32_t reset_cause)
+struct settings settings_read(int32_t board, int32_t reset_cause, bool divides_supply)
 {
     const struct record *found = newest();
     if (found != NULL && is_possible(found)) {
-        const struct settings settings = from_record(found, board, reset_cause);
+        const struct settings settings = from_record(found, board, reset_cause, divides_supply);
         if (dcmp_config_valid(&settings.config)) {
             return settings;
         }
     }
-    struct settings weak = from_record(&unknown, board, reset_cause);
+    struct record least = unknown;
+    if (divides_supply) {
+        least.full_scale_mV = SUPPLY_MAX_MV; /* whatever the supply is, the voltage is at most what is asked for */
+    }
+    struct settings weak = from_record(&least, board, reset_cause, divides_supply);
     weak.failure = found == NULL ? APP_NO_RECORD : APP_BAD_RECORD;
     return weak;
 }

@@ -14,8 +14,8 @@ struct settings {
     int32_t failure; /* enum app_failure */
 };
 
-/* Read the record; without a good one, the settings are weak and their `failure` says so. */
-struct settings settings_read(int32_t board, int32_t reset_cause);
+/* Read the record; `divides_supply` is the amplifier's (amplifier.h). Without a good one, the settings are weak and their `failure` says so. */
+struct settings settings_read(int32_t board, int32_t reset_cause, bool divides_supply);
 
 /* Count this boot, in a new record. Takes up to half a second, once in some two hundred boots. */
 void settings_count_boot(struct settings *settings);

@@ -309,6 +309,7 @@ static bool take_field(struct dcmp_config *config, const char *argument)
         {"travel_limit_counts", &config->travel_limit_counts},
         {"last_fault", &config->last_fault},
         {"last_fault_detail", &config->last_fault_detail},
+        {"supply_mV", &config->supply_mV},
     };
     const char *equals = strchr(argument, '=');
     const long value = equals == NULL ? 0 : strtol(&equals[1], NULL, 10);

@@ -158,7 +158,7 @@ void board_hold(void)
 static void start(void)
 {
     (void)clock_start(BOARD_CRYSTAL_HZ); /* the emulator has none: the waits end, and that is what is tried here */
-    board.settings = settings_read(BOARD_NUMBER, reset_take_cause());
+    board.settings = settings_read(BOARD_NUMBER, reset_take_cause(), false);
     board.app.failure = board.settings.failure;
     app_start(&board.app, &board.settings.config,
               board.settings.link == RECORD_SLCAN ? DCMP_CARRIER_SLCAN : DCMP_CARRIER_COBS, &fault_log,

@@ -13,6 +13,10 @@ struct amplifier_scale {
     int32_t full_scale_mV; /* DAC: 2048 codes from there; PWM: duty cycle 1, the motor's supply */
 };
 
+/* Whether the voltage is a part of the motor's supply: then `full_scale_mV` has to be that supply, or every limit is
+ * wrong by the factor by which it is. */
+bool amplifier_divides_supply(void);
+
 /* ENABLE low, the first thing after a reset. */
 void amplifier_hold(void);
 

@@ -16,6 +16,11 @@ static int32_t rounded(int32_t dividend, int32_t divisor)
     return (dividend + (dividend < 0 ? -divisor : divisor) / 2) / divisor;
 }
 
+bool amplifier_divides_supply(void)
+{
+    return false;
+}
+
 void amplifier_hold(void)
 {
     enable_hold();

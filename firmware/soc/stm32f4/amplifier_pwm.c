@@ -17,6 +17,11 @@ static void write_duty(int32_t part, int32_t whole)
     TIM1->CCR1 = size < whole ? (uint32_t)size * period / (uint32_t)whole : period;
 }
 
+bool amplifier_divides_supply(void)
+{
+    return true;
+}
+
 void amplifier_hold(void)
 {
     enable_hold();

@@ -19,6 +19,7 @@ BUILT = {
     12: 0,
     13: 5,
     14: -41234,
+    15: 24000,
 }
 RANGES = {7: (1, 10000), 8: (1, TOP), 9: (5, 50), 10: (1, 40000), 11: (1, 20000), 12: (0, 1)}
 
@@ -75,7 +76,8 @@ def test_who_may_and_when(core: Core) -> None:
     bench.hello()
     assert _set(bench, 9, 30, session=9) == (NOT_OWNER, 20)
     assert _set(bench, 0, 30) == (UNKNOWN, 0)
-    assert _set(bench, 15, 30) == (UNKNOWN, 0)
+    assert _set(bench, 15, 30) == (READ_ONLY, 24000)
+    assert _set(bench, 16, 30) == (UNKNOWN, 0)
     for number in (*range(1, 7), 13, 14):
         assert _set(bench, number, BUILT[number]) == (READ_ONLY, BUILT[number])
     for state in (2, 3, 4):
@@ -132,6 +134,7 @@ LIMITS = {
     "watchdog_ms": (5, 50),
     "speed_limit_counts_s": (1, TOP),
     "travel_limit_counts": (1, TOP),
+    "supply_mV": (0, TOP),
     "node": (0, 15),
     "counts_per_rev": (1, TOP),
 }

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tests.target.machine.ports import Frame
 
 _BOARD = 3
+_DAC_MV = 10_000
 _SAID_US = 600.0  # by then it has said what there is to say of a tick
 _SIGN = 1 << 31
 
@@ -38,7 +39,11 @@ class TargetBoard:
     """
 
     def __init__(self, elf: Path, rig: Rig, carrier: str = "cobs", **options: object) -> None:
-        kept = record(board_config(rig, _BOARD), link=RecordLink[carrier])
+        kept = record(
+            board_config(rig, _BOARD),
+            link=RecordLink[carrier],
+            full_scale_mV=rig.amplifier.supply_mV or _DAC_MV,
+        )
         self.system = System(elf, image(kept), **options)  # type: ignore[arg-type]
         self.pins = PlantIO(rig)
         self.carrier = carrier
