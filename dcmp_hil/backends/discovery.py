@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
 
 LISTEN = 0.25  # s; a device sends every period, from boot on
+_TWINS = 1.0  # s, longer where ticks are odd
 _TICKS = 256
 _OTHER = 7  # fault class of every code from 7 on
 _ASKS_ONLY = 0  # the session of a HELLO that owns nothing
@@ -175,6 +176,7 @@ def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
     ticks: dict[int, int] = {}
     nodes: set[int] = set()
     watches: dict[int, TickWatch] = {}
+    longest_ns = deadline_ns + int(1e9 * _TWINS)
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
         heard = caller.overhear(1e-9 * left_ns)
         if heard is None:
@@ -187,7 +189,10 @@ def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
                 deadline_ns = clock.now_ns() + int(1e9 * LISTEN)
             nodes.add(node)
         ticks[node] = sample.tick
-        watches.setdefault(node, TickWatch()).add(sample)
+        watch = watches.setdefault(node, TickWatch())
+        watch.add(sample)
+        if watch.suspicious and not watch.two_devices:
+            deadline_ns = max(deadline_ns, min(longest_ns, clock.now_ns() + int(1e9 * LISTEN)))
     twice = {node for node, watch in watches.items() if watch.two_devices}
     return {node: node in twice for node in sorted(nodes | twice)}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
+import can
 import pytest
 
 from dcmp_hil.backends import open_backend
@@ -204,6 +206,44 @@ def test_ports_lists_every_device_of_a_bus(cli: Cli, monkeypatch: pytest.MonkeyP
     nodes = [rig.backend.node for rig in commands(outcome) if isinstance(rig.backend, Can)]
     assert nodes == [2, 9], outcome.out
     assert outcome.out.count("firmware 0.1") == 2
+
+
+def test_ports_and_monitor_notice_two_devices_with_one_node(
+    cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    channel = "ports-one-node-twice"
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
+    ending = threading.Event()
+
+    def two_devices() -> None:
+        with can.Bus(channel=channel, interface="virtual", ignore_config=True) as bus:
+            for tick in itertools.count():
+                for other in (0, 90):
+                    number, data = pack(_SAMPLE._replace(tick=(tick + other) % 256), 5)
+                    bus.send(can.Message(arbitration_id=number, data=data, is_extended_id=False))
+                if ending.wait(2e-3):
+                    return
+
+    thread = threading.Thread(target=two_devices)
+    thread.start()
+    way = ("--set", "backend.interface=virtual", "--set", f"backend.channel={channel}")
+    try:
+        listed = cli("ports")
+        watched = cli("monitor", "bench-can", *way, "--duration", "2")
+    finally:
+        ending.set()
+        thread.join()
+    assert "node 5, TWO devices" in listed.out
+    assert watched.err.count("two devices send as node 5") == 1
+
+
+def test_ports_waits_for_a_board_that_boots(cli: Cli) -> None:
+    with device() as pump:
+        pump.silent.set()
+        threading.Timer(1.0, pump.silent.clear).start()
+        outcome = cli("ports", path_of(pump), "--wait", "20")
+    assert "node 0, firmware 0.1" in outcome.out
 
 
 def test_ports_goes_on_where_a_driver_fails_in_looking(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
