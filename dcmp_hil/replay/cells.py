@@ -20,6 +20,7 @@ DAY = 86_400.0  # s
 
 _SPACES = "\u00a0\u202f\u2009"
 _PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_HEX = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
 _DRESSED = re.compile(r"[(\['=]*\s*(?:[A-Za-z_]\w*\s*[:=]\s*)?(?P<number>[+\-\u2212]?[\d.,].*?)\s*[)\]']*")
 _TAIL = re.compile(r"(?P<number>.*?[\d.,])\s*(?P<unit>[^\d\s.,+-][^\d,;]*)")
 _GROUPED = {
@@ -54,6 +55,8 @@ def number(cell: str, decimal: str = ".") -> float:
     text = cell.strip()
     if decimal == "." and _PLAIN.fullmatch(text):
         return _finite(text)
+    if _HEX.fullmatch(text):
+        return float(int(text, 16))
     dressed = _DRESSED.fullmatch(text)
     if dressed is None:
         return math.nan

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.replay.cells import is_clock, numbers
+from dcmp_hil.replay.layout import HALF
 from dcmp_hil.replay.names import match, sample_number, split_time
 
 if TYPE_CHECKING:
@@ -95,11 +99,23 @@ def _time(table: Table, options: ColumnOptions) -> tuple[Match | None, Match | N
     wanted = pair is not None and (named is None or named.lower() == pair[0].lower())
     if pair and wanted:
         return _two_columns(table, options, *pair)
-    found = _find("time", table, options)
+    found = _find("time", table, options) or _unnamed_time(table)
     if found is None and options.period is None:
         raise _missing(table, "time", " Without one, say how far apart the rows are: --period T, in seconds.")
     number = sample_number(table.header) if found is None else None
     return found if number is None else match("time", table.header, number, None), None
+
+
+def _unnamed_time(table: Table) -> Match | None:
+    """Take a first column without a name as the time, as pandas writes an index of times."""
+    if table.header[0] != "1" or not table.named:
+        return None
+    cells = table.column("1")
+    values = numbers(cells, table.decimal)
+    clocks = sum(map(is_clock, cells)) > HALF * len(cells)
+    steps = np.diff(values[np.isfinite(values)])
+    rises = len(steps) > 0 and bool((steps > 0.0).all()) and float(np.median(steps)) != 1.0
+    return match("time", table.header, "1", None) if clocks or rises else None
 
 
 def _two_columns(

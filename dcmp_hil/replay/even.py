@@ -22,6 +22,7 @@ _AGREES = 0.02  # between a period that is told and the one that the stamps show
 _LOSS = 0.75  # of a period, by which the stamps move on where a row was lost
 _KINDS = 6  # of steps that a coarse clock shows
 _ROUNDING = 1e-6  # s
+_LONGEST = 1e15  # of them
 
 
 class _Grid(NamedTuple):
@@ -124,7 +125,8 @@ def _fit(time: Column, resolution: float, told: float | None = None) -> _Grid:
     # The mean is right where no row was lost, the smallest and the median step where some were.
     short = min(_SHORT_WINDOW, len(time) - 1)
     fewest = float(np.quantile(time[short:] - time[:-short], 0.2)) / short
-    guesses = [float(np.mean(means[near])), fewest, float(np.median(np.diff(time))), told or 0.0]
+    mean = float(np.mean(means[near])) if near.any() else usual
+    guesses = [mean, fewest, float(np.median(np.diff(time))), told or 0.0]
     grids = [_refined(time, guess, resolution) for guess in guesses if guess > 0.0]
     return min(grids, key=lambda grid: grid.spread)
 
@@ -160,7 +162,7 @@ def _numbered(time: Column, period: float, resolution: float) -> Column:
 def _resolution(steps: Column) -> float:
     """Return the step of a coarse clock, s; 0 where the steps do not come in a few sizes."""
     sizes = np.unique(np.round(steps / _ROUNDING))
-    if not 1 < len(sizes) <= _KINDS:
+    if not 1 < len(sizes) <= _KINDS or sizes[-1] > _LONGEST:
         return 0.0
     return float(np.gcd.reduce(sizes.astype(np.int64))) * _ROUNDING
 

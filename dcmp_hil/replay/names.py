@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.units import SI, find_unit, known_unit
+from dcmp_hil.replay.units import SI, any_unit, find_unit, known_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,12 +143,12 @@ def match(
     if unit is not None:
         return Match(quantity, name, *known_unit(quantity, unit), "option")
     words, found = _parts(quantity, name)
-    if found is None and len(words) == 1 and (words[0] in _WHOLE or name.lower() == "counts"):
+    if found is None and len(words) == 1:
         found = find_unit(quantity, words[0])
     if found is not None:
         return Match(quantity, name, *found, "name")
     told = units[list(header).index(name)] if units else ""
-    if not told:
+    if not any_unit(told):
         return Match(quantity, name, SI[quantity], 1.0, "assumed")
     in_file = find_unit(quantity, told)
     if in_file is None:
@@ -185,6 +185,8 @@ def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
     same = [name for name in header if name.lower() == column.strip().lower()]
     if len(same) == 1:
         return same[0]
+    if column.strip().isdigit() and 0 < int(column) <= len(header):  # by its place, from 1
+        return header[int(column) - 1]
     close = get_close_matches(column, header, n=1)
     hint = f'Did you mean "{close[0]}"?' if close else "Name one of these."
     raise ConfigError(f'--{quantity}: no column "{column}"; the header has: {", ".join(header)}. {hint}')

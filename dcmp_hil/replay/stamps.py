@@ -21,6 +21,8 @@ _COUNTERS = tuple(2.0**bits for bits in (8, 16, 24, 31, 32))
 _TICKS = (1e-9, 1e-6, 1e-3)  # s: of a 32-bit counter that the file gives in another unit
 _CLOCKS = (60.0, 3600.0, 43_200.0, 86_400.0, 604_800.0)  # s: seconds of the minute ... of the week
 _FEW = 0.05  # share of rows
+_DAYS = ((2e4, 8e4), (7e5, 8e5))  # since 1900, since the year 0: from 1954 on
+_SHORTEST = 1e-5  # of a day: 0.9 s
 _EPOCHS = ((1e11, 1e14, "ms", 1e-3), (1e14, 1e17, "us", 1e-6), (1e17, 1e20, "ns", 1e-9))
 
 
@@ -47,8 +49,14 @@ class Stamps(NamedTuple):
 
 
 def epoch_unit(raw: Column) -> tuple[str, float] | None:
-    """Return the unit of a time since 1970 that is too large to be in seconds, and its size in s."""
+    """Return the unit of a date that cannot be in seconds, and its size in s.
+
+    Such are times since 1970 in ms, us or ns, and the day numbers of Excel and MATLAB.
+    """
     middle = float(np.median(raw))
+    step = float(np.median(np.abs(np.diff(raw)))) if len(raw) > 1 else 1.0
+    if any(low < middle < high for low, high in _DAYS) and 0.0 < step < _SHORTEST:
+        return "days", 86_400.0
     return next(((name, size) for low, high, name, size in _EPOCHS if low < middle < high), None)
 
 
@@ -80,6 +88,9 @@ def rising(raw: Column, size: float, copies: NDArray[np.bool_], period: float | 
     notes: list[str] = []
     rows = np.arange(len(raw))
     steps = np.diff(raw)
+    if not (steps > 0.0).any() and period is not None and not steps.any():
+        notes.append(f"Evenly sampled, {period:g} s (--period); all stamps are the same.")
+        return Stamps(period * rows.astype(np.float64), rows, (), tuple(notes))
     if not (steps > 0.0).any():
         raise ConfigError(
             f"{name}: no stamp is later than the one before. If the rows are evenly sampled, say so: "

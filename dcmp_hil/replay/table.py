@@ -134,7 +134,7 @@ def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str],
         text = above[place][1]
         for fields in _as_header(text, layout):
             words = [field for field in fields if field]
-            if not units and len(words) > 0 and _are_units(words) and place > 0:
+            if not units and place > 0 and _are_units(words, layout):
                 units = fields
                 break
             if words and sum(is_value(word, layout.decimal) for word in words) < HALF * len(words):
@@ -156,10 +156,12 @@ def _as_header(text: str, layout: Layout) -> Iterator[list[str]]:
         yield grouped
 
 
-def _are_units(words: Sequence[str]) -> bool:
+def _are_units(fields: Sequence[str], layout: Layout) -> bool:
+    """Whether the words of a line, numbers left aside, are units."""
+    words = [field for field in fields if not is_value(field, layout.decimal)]
     bracketed = sum(bool(re.fullmatch(r"\(.*\)|\[.*\]", word)) for word in words)
     known = sum(any_unit(word) or word in ("-", "%", "1") for word in words)
-    return known > HALF * len(words) or bracketed == len(words)
+    return bool(words) and (known > HALF * len(words) or bracketed == len(words))
 
 
 def _rows(
@@ -206,7 +208,7 @@ def _aligned(
         units = [*units, ""] if not header[-1] else ["", *units]
     if len(header) > width:
         rows = [row + [""] * (len(header) - width) for row in rows]
-    header = [name.strip().strip("#%").strip() for name in header]
+    header = [name.strip().strip("#%").strip() or str(place) for place, name in enumerate(header, 1)]
     units = (units + [""] * len(header))[: len(header)]
     cells = [unit_in(cell) or "" for cell in first] + [""] * (len(header) - width)
     units = [re.sub(r"[\[\]()]", "", told) or cell for told, cell in zip(units, cells, strict=True)]

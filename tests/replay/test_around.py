@@ -16,6 +16,7 @@ from tests.replay.logged import (
     between,
     check,
     columns,
+    iso,
     usual,
     with_cell,
 )
@@ -185,6 +186,67 @@ case(
     "a velocity of words",
     lambda: [f"{HEADER},velocity_rad_s", *(f"{row},off" for row in columns().lines())],
     expect=Expect(note="holds no number"),
+)
+
+# ------------------------------------------------------------------------------------- named instruments
+case(
+    "Rigol",
+    lambda: [
+        "X,CH1,CH2,Start,Increment,",
+        "Sequence,Volt,Volt,-6.000000e-03,2.000000e-03",
+        *(f"{k},{q},{u},," for k, (q, u) in enumerate(zip(columns().q, columns().u, strict=True))),
+    ],
+    time="X",
+    position="CH1",
+    position_unit="rad",
+    voltage="CH2",
+    period=T,
+)
+case(
+    "Tektronix, without a header",
+    lambda: [
+        f"{'Record Length,1500,' if k == 0 else 'Source,CH1,' if k == 1 else ',,'},{t},{q},{u},"
+        for k, (t, q, u) in enumerate(zip(*columns(), strict=True))
+    ],
+    time="4",
+    position="5",
+    voltage="6",
+)
+case(
+    "Tektronix",
+    lambda: [
+        *("Model,MDO3014", "Firmware Version,1.2", "", "Horizontal Units,S,", ",,", "Sample Interval,0.002,"),
+        *("Record Length,1500,", "Label,pos,volt", "TIME,CH1,CH2"),
+        *columns().lines(),
+    ],
+    position="CH1",
+    voltage="CH2",
+)
+case(
+    "dSPACE",
+    lambda: [
+        *("type;time;angle;voltage", "unit;s;rad;V"),
+        *(f"data;{row}" for row in columns().lines(";")),
+    ],
+)
+case(
+    "pandas with an index of times",
+    lambda: [
+        ",position_rad,voltage_V",
+        *(f"{iso(float(t), '+00:00', ' ')},{q},{u}" for t, q, u in zip(*columns(), strict=True)),
+    ],
+)
+case(
+    "rosbag to csv",
+    lambda: [
+        "rosbagTimestamp,header,seq,stamp,secs,nsecs,frame_id,name,position,velocity,effort",
+        *(
+            f"{(EPOCH * 500 + k) * 2000000},,{k},,{EPOCH + k // 500},{k % 500 * 2000000},'',"
+            f"['j'],[{q}],[0],[{u}]"
+            for k, (q, u) in enumerate(zip(columns().q, columns().u, strict=True))
+        ),
+    ],
+    voltage="effort",
 )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.replay.logged import DEG, HEADER, Cases, Expect, check, columns, motion, usual
+from tests.replay.logged import COUNTS, DEG, HEADER, Cases, Expect, check, columns, motion, usual
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -109,6 +110,18 @@ case(
 )
 case("sep= line", lambda: ["sep=;", *usual().replace(",", ";").splitlines()])
 case("sep= line, quoted", lambda: ['"sep=,"', *usual().splitlines()])
+case(
+    "counts in hex",
+    lambda: [
+        "time_s,counts,voltage_V",
+        *(
+            f"{t},0x{round(q * COUNTS / math.tau) % 65536:04X},{u}"
+            for t, q, u in zip(columns().t, motion().position, columns().u, strict=True)
+        ),
+    ],
+    counts_per_rev=COUNTS,
+    modulus=65536.0,
+)
 
 
 @pytest.mark.parametrize("name", CASES)

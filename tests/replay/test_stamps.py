@@ -206,6 +206,12 @@ case(
     period=T,
 )
 case("a time column of no use", lambda: stamped(lambda _: "1.76723e+09", "time_s"), time="none", period=T)
+case(
+    "the day numbers of Excel",
+    lambda: stamped(lambda k: f"{46083.42444 + k * T / 86400:.12f}", "time"),
+    expect=Expect(near=1e-3),
+)
+case("all stamps the same, told", lambda: stamped(lambda _: "1.76723e+09", "time_s"), period=T)
 
 
 @pytest.mark.parametrize("name", CASES)
