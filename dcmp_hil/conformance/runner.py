@@ -1,4 +1,4 @@
-"""Runs checks one after the other, and leaves the device disarmed at 0 V whatever happens."""
+"""Runs checks one after the other, and leaves the device disarmed at 0 V however they end."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def _settle(client: Client) -> str:
             if client.state == State.IDLE and (identity is None or not identity.busy):
                 client.sessions.clear()
                 return ""
-            client.listen(client.periods(600))  # an ownership that nobody renews is over by then
+            client.listen(client.periods(600))  # an ownership that is not renewed is over by then
     except SampleTimeoutError as error:
         return str(error)
     state = State(client.state).name if client.state in set(State) else f"state {client.state}"

@@ -59,7 +59,7 @@ def test_a_seeded_error_is_found_by_its_check(error: str) -> None:
     assert [(one.check.name, one.verdict) for one in outcomes] == [(name, Verdict.FAILED)], outcomes
     assert all(finding and finding[-1] not in "\n " for one in outcomes for finding in one.findings)
     assert any(one.findings for one in outcomes)
-    for _ in range(60):  # whatever is wrong with it, but for its watchdog and its 0 V
+    for _ in range(60):  # off by itself by now, unless wrong are its watchdog and its 0 V
         arm.tick()
     if "watchdog" not in error and "stays after" not in error:
         assert arm.log[-1] == (0, False)

@@ -73,7 +73,7 @@ def arming_gap(host: Recorder) -> None:
 
 
 def gap(host: Recorder) -> None:
-    """Periods without a DRIVE, and DRIVEs that are too old, repeated, turned round or somebody else's."""
+    """Periods without a DRIVE, and DRIVEs that are too old, repeated, turned round or of another session."""
     host.arm()
     host.run(3, 1000)
     host.tick(times=3)
@@ -279,7 +279,7 @@ SCENARIOS: dict[str, Scenario] = {
     "watchdog": Scenario(
         "Silence in RUN: FAULT(HOST_SILENT) at a tick, and between two by ttl_ms.", watchdog
     ),
-    "wrong-count": Scenario("One wrong count is repaired, whatever its size; two are speed.", wrong_count),
+    "wrong-count": Scenario("One wrong count of any size is repaired; two are speed.", wrong_count),
     "jumps": Scenario("The third jump within 100 periods is ENCODER_JUMP.", jumps),
     "over-speed": Scenario("One count a period above the limit is OVER_SPEED, a tick later.", over_speed),
     "over-speed-2ms": Scenario("A speed that only twice the time shows.", over_speed_slow),

@@ -60,7 +60,7 @@ def cobs_damage(client: Client) -> Iterator[str]:
         yield from _counted(client, before, 1, what)
     before = client.health().crc_errors
     line.write(b"\0\0\0")
-    line.write(_stuffed(body[:2] + b"\0\0\0"))  # a STOP of a wrong length: for nobody
+    line.write(_stuffed(body[:2] + b"\0\0\0"))  # a STOP of a wrong length: ignored
     yield from _still_hears(client, "empty frames")
     yield from _counted(client, before, 0, "empty frames and one of another length are no errors")
 

@@ -61,7 +61,7 @@ _ANSWERS = ("Identity", "ParameterValue")
 
 
 def foreign(client: Client) -> Iterator[str]:
-    """Send frames of other nodes, numbers and lengths: a STOP of another node must stop nobody here."""
+    """Send frames of other nodes, numbers and lengths: a STOP of another node changes nothing."""
     session = client.own()
     before = client.health().crc_errors
     _, stop = pack(Stop(0), client.node)

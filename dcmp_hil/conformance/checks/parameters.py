@@ -139,8 +139,8 @@ def ranges(client: Client) -> Iterator[str]:
 
 def owner_only(client: Client) -> Iterator[str]:
     """Set as a stranger; of several reasons the lowest is answered."""
-    nobody = client.another_session()
-    yield from _tried(client, nobody, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_OWNER)
+    stranger = client.another_session()
+    yield from _tried(client, stranger, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_OWNER)
     client.own()
     other = client.another_session()
     yield from _tried(client, other, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_OWNER)

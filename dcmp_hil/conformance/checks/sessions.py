@@ -146,7 +146,7 @@ def lease(client: Client) -> Iterator[str]:
     client.get(Parameter.TICK)
     asked = client.tick
     client.listen(client.periods(_LEASE_MS - _NEAR_MS))
-    answer = client.hello()  # of nobody: renews nothing
+    answer = client.hello()  # of session 0: renews nothing
     if client.tick - asked < client.periods(_LEASE_MS) and answer is not None and not answer.busy:
         yield f"the ownership was over {client.tick - asked} periods after the owner's HELLO, before 500 ms"
     client.listen(client.periods(2 * _NEAR_MS))
@@ -157,7 +157,7 @@ def lease(client: Client) -> Iterator[str]:
             "after 500 ms"
         )
     session = client.own()
-    for _ in range(3):  # a PARAMETER_SET counts, whatever its result
+    for _ in range(3):  # a PARAMETER_SET counts, refused or not
         client.listen(client.periods(_LEASE_MS - 2 * _NEAR_MS))
         client.put(session, Parameter.TICK, 0)
     answer = client.hello()
