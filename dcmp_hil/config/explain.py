@@ -63,7 +63,7 @@ def _by_rule(name: str, rig: Rig) -> str:
 
 def warnings(rig: Rig) -> list[str]:
     """Name what is allowed and yet seldom meant."""
-    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start)
+    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start, _signs)
     return [sentence for rule in rules if (sentence := rule(rig))] + beyond_reach(rig)
 
 
@@ -124,6 +124,25 @@ def _coarse(rig: Rig) -> str:
 def _is_ideal(rig: Rig) -> bool:
     """Recognise the paper's simulation, where nothing is between the loop and the plant."""
     return rig.encoder.counts is None and math.isinf(rig.amplifier.limit)
+
+
+def _signs(rig: Rig) -> str:
+    """Tell who sets a sign to see a reversed motor, and sees none."""
+    turned = [
+        (f"{key}.sign", fault)
+        for key, section, fault in (
+            ("amplifier", rig.amplifier, "plant.motor_sign"),
+            ("encoder", rig.encoder, "plant.enc_sign"),
+        )
+        if section.sign == -1
+    ]
+    if not turned or not rig.backend.simulated:
+        return ""
+    keys, faults = zip(*turned, strict=True)
+    return (
+        f"{' and '.join(keys)} = -1: a simulated rig is wired as its file says, and the loop sees no "
+        f"difference. What a wrong sign does is shown by --fault {' or '.join(faults)}."
+    )
 
 
 def _soft_start(rig: Rig) -> str:

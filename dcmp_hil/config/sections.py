@@ -29,7 +29,7 @@ class EncoderSection(Section):
     """Counts a revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
 
     sign: Literal[1, -1] = 1
-    """-1 if the encoder counts down when the arm rises."""
+    """-1 if the encoder counts down when the arm rises; a simulated one then does."""
     zero: Annotated[int, Field(ge=-(2**23), le=2**23 - 1)] | Literal["at_start"] = "at_start"
     """Count at which the arm hangs, or "at_start": where it is when a run begins. The simulated rig knows."""
 
@@ -53,7 +53,7 @@ class AmplifierSection(Section):
     """Largest change, V/s; "none" for no limit."""
 
     sign: Literal[1, -1] = 1
-    """-1 if a positive voltage lowers the arm."""
+    """-1 if a positive voltage lowers the arm; a simulated motor is then wired so."""
     supply_V: Annotated[float, Field(ge=1, le=100)] | Literal["none"] = "none"
     """The motor's supply, V, where the board divides it (PWM); "none": the amplifier is told a voltage."""
 

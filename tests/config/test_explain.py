@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from dcmp_hil import TripError, run
 from dcmp_hil.config import load_rig, shipped_rigs
 from dcmp_hil.config.explain import explain, warnings
 from tests.installed import Finished
@@ -94,3 +95,26 @@ def test_check_warns_of_a_start_without_a_probe_wherever_a_motor_may_move(
     assert done.code == 0, done.err
     assert "probe" in done.err
     assert "is found by running away" in " ".join(done.err.split())
+
+
+@pytest.mark.parametrize(
+    ("sets", "says"),
+    [
+        (["amplifier.sign=-1"], "amplifier.sign = -1: a simulated rig is wired as its file says"),
+        (["encoder.sign=-1"], "by --fault plant.enc_sign."),
+        (["amplifier.sign=-1", "encoder.sign=-1"], "amplifier.sign and encoder.sign = -1: "),
+    ],
+)
+@pytest.mark.parametrize("backend", ["sim", "sim-board"])
+def test_sign_that_a_simulation_follows_is_told(sets: list[str], says: str, backend: str) -> None:
+    (sentence,) = warnings(load_rig("bench-1khz", [*sets, f"backend.kind={backend}"]))
+    assert says in sentence
+    device = ["backend.kind=serial", "backend.port=/dev/ttyACM0"]
+    assert warnings(load_rig("bench-1khz", [*sets, *device])) == []
+
+
+def test_fault_that_the_warning_names_reverses_the_simulated_motor() -> None:
+    rig = load_rig("bench-1khz", ["amplifier.sign=-1"])
+    assert run(rig, duration=2.0, fast=True).summary.periods == 2000
+    with pytest.raises(TripError, match="goes the wrong way"):
+        run(rig, duration=2.0, fast=True, faults=["plant.motor_sign"])

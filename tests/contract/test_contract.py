@@ -82,7 +82,7 @@ def test_positive_voltage_raises_the_arm(kind: str) -> None:
         assert drive(backend, 4.0, 150)[-1].position > 0.05
 
 
-@wired
+@every
 @pytest.mark.parametrize("signs", [("1", "-1"), ("-1", "1"), ("-1", "-1")])
 def test_signs_of_the_wiring_are_undone_on_the_host(kind: str, signs: tuple[str, str]) -> None:
     wiring = (f"encoder.sign={signs[0]}", f"amplifier.sign={signs[1]}")
