@@ -74,19 +74,18 @@ def remarks(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
 def _same(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
     counts = device[Parameter.COUNTS_PER_REV]
     rate_hz, asked_hz = 1e6 / device[Parameter.PERIOD_US], 1e6 / terms.period_us
-    return [
-        (
+    found = [_supply(terms.supply_mV, device[Parameter.SUPPLY_MV])]
+    if counts != terms.counts_per_rev:
+        found.append(
             f"encoder.counts_per_rev: the rig says {terms.counts_per_rev}, the device {counts}. "
             "Correct the rig, or build the firmware for this encoder."
         )
-        * (counts != terms.counts_per_rev),
-        (
+    if rate_hz != asked_hz:
+        found.append(
             f"loop.rate_hz: the rig says {asked_hz:g}, the device {rate_hz:g}. "
             "Correct the rig, or build the firmware for this rate."
         )
-        * (rate_hz != asked_hz),
-        _supply(terms.supply_mV, device[Parameter.SUPPLY_MV]),
-    ]
+    return found
 
 
 def _supply(asked_mV: int, found_mV: int) -> str:
