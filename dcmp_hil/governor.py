@@ -34,7 +34,8 @@ class Bounds(NamedTuple):
     def jump(self, target: float, distance: float) -> bool:
         """Return whether a jump to `target` (rad) over `distance` may be left to the controller."""
         size = abs(distance)
-        fastest = math.sqrt(_STRONGER * self.strongest * size) if size > 0.0 else 0.0
+        known = math.isfinite(self.strongest)  # else it is a simulation without a limit
+        fastest = math.sqrt(_STRONGER * self.strongest * size) if known else 0.0
         return size <= _JUMP and abs(target) + _OVERSHOOT * size <= self.position and fastest <= self.velocity
 
 

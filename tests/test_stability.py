@@ -83,3 +83,18 @@ def test_motor_beyond_the_margin_runs_away_and_inside_it_does_not() -> None:
     assert shakes(0.85 * high) < 150.0  # V/s; 62 as believed
     assert shakes(1.25 * high) > 250.0
     assert shakes(1.2 * low) < 150.0
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("observer.L1_1_s=1e5", r"observer\.L1_1_s: got 100000; explicit Euler steps"),
+        ("observer.L1_1_s=1500.0", "moves the estimated velocity"),
+        ("observer.M_rad_s3=1e7", "moves the estimated velocity"),
+        ("observer.M_rad_s3=1e5", "swings by 100 rad/s2"),
+    ],
+)
+def test_gains_that_explicit_euler_cannot_bear_are_refused(override: str, words: str) -> None:
+    load_rig("bench-1khz", ["observer.kind=paper"])
+    with pytest.raises(ConfigError, match=words):
+        load_rig("bench-1khz", ["observer.kind=paper", override])

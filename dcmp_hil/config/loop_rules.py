@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dcmp_hil.config.words import number
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers import ObserverContext
+from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.stability import LinearLoop, LoopSpec, bandwidths
 
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
 
 _LEAST, _MOST = 0.8, 1.25  # times the believed motor gain, between which the loop must be stable
 _QUIET = 0.25  # of the voltage limit, that the encoder's count alone may cost (standard deviation)
+_GROWTH, _SWINGS = 0.1, 0.1  # 1/s; of the velocity limit
 _BLAMED = (
     ("loop", "rate_hz"),
     ("controller", "kp_1_s2"),
@@ -51,6 +55,8 @@ def loops(rig: Rig) -> list[LinearLoop]:
 def _fault(rig: Rig) -> str:
     if rig.supervisor.monitors != "all":
         return ""
+    if isinstance(rig.observer, PaperSettings):
+        return _euler_fault(rig, rig.observer)
     for loop in loops(rig):
         if not (loop.stable() and loop.stable(_LEAST) and loop.stable(_MOST)):
             return _unstable(loop)
@@ -61,6 +67,32 @@ def _fault(rig: Rig) -> str:
                 f"(standard deviation); at most {_QUIET * rig.amplifier.limit:.3g} V, a quarter of "
                 "amplifier.voltage_limit_V. Lower controller.kd_1_s, observer.mu0_rad_s or observer.M_rad_s3."
             )
+    return ""
+
+
+def _euler_fault(rig: Rig, observer: PaperSettings) -> str:
+    """Name what makes the paper's explicit Euler steps run away, or swing by more than the arm ever does."""
+    step, count = rig.period, rig.encoder.count
+    copy = np.array([[-observer.L1_1_s, 1.0], [-observer.L2_1_s2, -rig.model.f0_1_s]])
+    if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH * step:
+        return (
+            f"explicit Euler steps of {1e3 * step:g} ms are not stable with these gains. Lower "
+            "observer.L1_1_s and observer.L2_1_s2, or raise loop.rate_hz."
+        )
+    noise = max(observer.L1_1_s * count, step * observer.L2_1_s2 * count)
+    noise += 2.0 * (observer.M_rad_s3 * count * count) ** (1 / 3)
+    if noise > _SWINGS * rig.supervisor.velocity_limit_rad_s:
+        return (
+            f"one count of the encoder moves the estimated velocity by {noise:.3g} rad/s, a tenth of "
+            "supervisor.velocity_limit_rad_s and more. Lower observer.L1_1_s, observer.L2_1_s2 or "
+            "observer.M_rad_s3."
+        )
+    swing = observer.M_rad_s3 * step  # of w_hat in a period
+    if swing > rig.model.ku_rad_s2_V * rig.amplifier.limit:
+        return (
+            f"in explicit Euler steps the estimated disturbance swings by {swing:.3g} rad/s2, more than the "
+            "motor has at amplifier.voltage_limit_V. Lower observer.M_rad_s3, or raise loop.rate_hz."
+        )
     return ""
 
 
