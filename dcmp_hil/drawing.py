@@ -1,4 +1,4 @@
-"""Matplotlib for pictures in files, whatever the environment says about windows."""
+"""Matplotlib for pictures in files: settings for windows have no effect."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def _control(options: Options) -> ControlProcess | None:
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
-    """Everybody who looks on: status line, the run's own recording, and Rerun with a viewer or a file."""
+    """Return the sinks of a run: status line, its own recording, and Rerun with a viewer or a file."""
     makers: list[SinkMaker] = [partial(status_line, rig.period)]
     if folder is not None:
         run, text = about(rig, options.note, options.faults, folder.path), rig_json(rig)
@@ -160,19 +160,19 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
 
 
 def _wants_picture(options: Options) -> bool:
-    """Where nobody sees the run live, a picture of it stays behind."""
+    """Return whether a run without a viewer leaves a picture."""
     return options.viewer == "none"
 
 
 def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> None:
-    """Keep and print the figures, however the run ended; whatever fails here is told, and changes no end."""
+    """Keep and print the figures of every kind of end; an error here is told, and changes no end."""
     cut_off = session.stop.signal is not None
     with session.stop.held():
         result = session.result()
         document = _document(session, options, result, end.ended_by)
         missing = folder.write(session.rig, document, end.error) if folder else []
         missing += _write_json(options.json_file, document)
-    with suppress(KeyboardInterrupt):  # asked for once more: whoever reads is slow, or drawing is
+    with suppress(KeyboardInterrupt):  # a user need not wait for a slow reader, or for a picture
         if options.json_file == "-":
             console.write_json("-", document)
         else:
@@ -180,7 +180,7 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
         for sentence in missing:
             console.warn(sentence)
         if folder is not None:
-            if not cut_off:  # drawing takes seconds, which whoever ended the run early has not got
+            if not cut_off:  # drawing takes seconds, and the end was asked for
                 folder.draw(result)
             folder.tell(options.record, live=options.viewer != "none")
 

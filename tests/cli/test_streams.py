@@ -161,7 +161,7 @@ def test_run_prints_figures_in_any_encoding(script: Script, tmp_path: Path, enco
         ("status 2>&-", 2),
     ],
 )
-def test_command_keeps_its_exit_code_whatever_takes_its_output(
+def test_command_keeps_its_exit_code_when_its_output_is_lost(
     installed: Path, tmp_path: Path, command: str, code: int
 ) -> None:
     assert shell(installed, tmp_path, f"dcmp-hil {command}", XDG_RUNTIME_DIR=str(tmp_path)) == (code, "")
