@@ -136,6 +136,12 @@ def test_name_in_both_folders_is_refused(tmp_path: Path, module: str) -> None:
         find_named(f"{module}:Obs", "observer.kind", folders=folders[1:])
 
 
+def test_checkout_of_this_program_in_the_current_folder_is_no_second_one(tmp_path: Path) -> None:
+    (tmp_path / "dcmp_hil").mkdir()
+    (tmp_path / "dcmp_hil" / "__init__.py").write_text("1 / 0\n")
+    assert find_named("dcmp_hil.values:Sample", "observer.kind", folders=[tmp_path]) is Sample
+
+
 def test_folder_of_data_with_the_name_of_the_module_is_no_second_one(tmp_path: Path, module: str) -> None:
     (tmp_path / "rig").mkdir()
     (tmp_path / "rig" / f"{module}.py").write_text(OBSERVER_TEXT)

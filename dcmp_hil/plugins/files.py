@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 
+_OURS = ("dcmp_hil", "sim_backend")  # they run already: a checkout in the current folder is no second one
+
+
 class Place(NamedTuple):
     """Where a module is.
 
@@ -72,7 +75,8 @@ def locate(module: str, folders: Sequence[Path], said: str) -> Place | None:
     """
     importlib.invalidate_caches()  # the file may have been written a moment ago
     parts = module.split(".")
-    searched = [_place(parts, None), *(_place(parts, [folder]) for folder in _absolute(folders))]
+    others = () if parts[0] in _OURS else _absolute(folders)
+    searched = [_place(parts, None), *(_place(parts, [folder]) for folder in others)]
     places = {os.path.realpath(place.where): place for place in reversed(searched) if place is not None}
     if len(places) > 1:
         both = " and ".join(shown_path(place.where) for place in reversed(places.values()))
