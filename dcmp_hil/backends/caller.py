@@ -66,11 +66,21 @@ class Caller:
         self.tick = tick  # of it; whole once PARAMETER_VALUE(TICK) was heard
         self.fault = 0  # code of the last fault heard of
         self.health: Health | None = None  # the newest
+        self._first_health: Health | None = None
         self.heard: Counter[str] = Counter()  # messages of this device, by kind
         self.nodes: set[int] = set()  # others that were heard
         self.corrupt = 0  # frames whose length or crc8 was wrong
         self.ticks = TickWatch()
         self._owed: dict[object, _Owed] = {}
+
+    @property
+    def damaged_there(self) -> int:
+        """By how much the device's count of damaged frames grew, as far as it told."""
+        return (
+            self.health.crc_errors - self._first_health.crc_errors
+            if self.health and self._first_health
+            else 0
+        )
 
     def say(self, message: Message) -> None:
         """Send a message."""
@@ -191,6 +201,7 @@ class Caller:
             self.fault = message.code
         elif isinstance(message, Health):
             self.health = message
+            self._first_health = self._first_health or message
         elif isinstance(message, ParameterValue):
             if message.id == Parameter.TICK:
                 self.tick = message.value

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
     from dcmp_hil.backends.terms import Terms
     from dcmp_hil.clock import Clock
+    from dcmp_hil.errors import OpenError
 
 _HELLOS, _TOLD = 5, 2
 _ROUND_TRIPS = 5
@@ -40,6 +41,7 @@ _SLOWEST = 3e-3  # s: a command older than that is refused by the device
 _JOINS, _EARLY, _LATE = 3, -4, 32  # ticks that a SAMPLE may differ from what TICK said before it
 _HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
 _TWINS_S = 0.1
+_MANY_DAMAGED = 5  # frames, in a second
 _RELEASES, _NEXT_S = 3, 0.1
 
 
@@ -71,6 +73,7 @@ class Handshake:
     def __init__(self, link: Link, caller: Caller, terms: Terms, clock: Clock) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._session = 1 + secrets.randbelow(0xFFFF)
+        self._damaged_before = 0
         self._booted_ns = 0  # the latest that a board has booted
 
     def run(self) -> Greeting:
@@ -86,9 +89,10 @@ class Handshake:
         """
         self._booted_ns = self._clock.now_ns() + int(1e9 * self._terms.boot_wait)
         self._listen()
-        firmware = self._introduce()
+        self._damaged_before = self._damaged
         arming = False
         try:
+            firmware = self._introduce()
             self._check_round_trip()
             found = self._compare()
             self._check_alone()
@@ -99,6 +103,9 @@ class Handshake:
             self._check_cold()
             arming = True
             self._arm()
+        except refusals.NoAnswerError as error:
+            self._give_back()
+            raise self._blamed(error) from error
         except BaseException as error:  # Ctrl-C too
             if arming and not isinstance(error, BackendError):
                 self._stop()
@@ -106,6 +113,17 @@ class Handshake:
                 self._give_back()
             raise
         return Greeting(self._session, self._caller.tick, firmware, cleared, tuple(found))
+
+    @property
+    def _damaged(self) -> int:
+        return self._link.corrupt + self._caller.corrupt
+
+    def _blamed(self, error: OpenError) -> OpenError:
+        """Blame the line for it, where the line damages frames."""
+        here, there = self._damaged - self._damaged_before, self._caller.damaged_there
+        if max(here, there) < _MANY_DAMAGED:
+            return error
+        return refusals.damaged(self._link.name, here, there, error)
 
     def _stop(self) -> None:
         """Leave nothing armed."""

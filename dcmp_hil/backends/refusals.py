@@ -19,6 +19,29 @@ _TIMER_S = 0.035  # two waits of an adapter's 16 ms, at most
 _FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
 
 
+class NoAnswerError(OpenError):
+    """A device was heard, and did not answer or obey: it may be the line."""
+
+
+def damaged(name: str, here: int, there: int, error: OpenError) -> OpenError:
+    """Make the error for a line that damages so much that the device could not be armed.
+
+    Parameters
+    ----------
+    name
+        What to call the link.
+    here, there
+        Frames that arrived damaged at this computer, and at the device.
+    error
+        What failed because of it.
+    """
+    first = str(error).removeprefix(f"{name}: ").partition(". ")[0]
+    return OpenError(
+        f"{name}: {first}, and the line damages frames: {here} on the way here, {there} on the way to the "
+        "device. Check cable, shield, ground and termination, and the baud or bit rate."
+    )
+
+
 def only_damage(name: str, other_carrier: str) -> OpenError:
     """Make the error for a line on which something is heard, and no frame in it; the carrier may be told."""
     if other_carrier:
@@ -47,9 +70,9 @@ def silence(name: str, seconds: float) -> OpenError:
     )
 
 
-def deaf(name: str) -> OpenError:
+def deaf(name: str) -> NoAnswerError:
     """Make the error for a device that is heard and does not hear."""
-    return OpenError(
+    return NoAnswerError(
         f"{name}: the device sends samples but does not answer. Check the wire from host to device (TX)."
     )
 
@@ -70,18 +93,18 @@ def owned(name: str) -> OpenError:
     )
 
 
-def slow(name: str, seconds: float) -> OpenError:
+def slow(name: str, seconds: float) -> NoAnswerError:
     """Make the error for answers that take too long; infinity for longer than was waited."""
     took = f"{1e3 * seconds:.1f} ms" if seconds < math.inf else f"more than {1e3 * LONGEST_TRIP:.0f} ms"
     said = f"{name}: an answer takes {took}, there and back, and commands older than 3 ms are refused."
     if seconds > _TIMER_S:
-        return OpenError(
+        return NoAnswerError(
             f"{said} No setting of an adapter makes so much: the line goes through something slow, such as a "
             "network, a radio or another program. Plug the device into this computer."
         )
     port = name.rpartition("/")[2]
     timer = f"/sys/bus/usb-serial/devices/{port if port.startswith('ttyUSB') else 'ttyUSB0'}/latency_timer"
-    return OpenError(f"{said} Lower the USB adapter's latency timer: echo 1 > {timer}")
+    return NoAnswerError(f"{said} Lower the USB adapter's latency timer: echo 1 > {timer}")
 
 
 def faulty(name: str, fault: str) -> OpenError:
@@ -124,10 +147,10 @@ def no_samples(name: str, seconds: float, heard: str) -> OpenError:
     )
 
 
-def not_taken(name: str, parameter: str, value: int, answer: ParameterValue | None) -> OpenError:
+def not_taken(name: str, parameter: str, value: int, answer: ParameterValue | None) -> NoAnswerError:
     """Make the error for a parameter that stays as it was."""
     why = "no answer" if answer is None else f"it stays at {answer.value}, {_result(answer.result)}"
-    return OpenError(
+    return NoAnswerError(
         f"{name}: the device does not take {parameter} = {value} ({why}). Use what it allows, build the "
         "firmware with a higher limit, or start again if another host was there a moment ago."
     )
@@ -137,14 +160,14 @@ def _result(result: int) -> str:
     return Result(result).name if result in set(Result) else f"result {result}"
 
 
-def not_told(name: str, parameter: str) -> OpenError:
+def not_told(name: str, parameter: str) -> NoAnswerError:
     """Make the error for a parameter that is not there."""
-    return OpenError(f"{name}: the device does not say its {parameter}. {_FIRMWARE}.")
+    return NoAnswerError(f"{name}: the device does not say its {parameter}. {_FIRMWARE}.")
 
 
-def not_armed(name: str, state: str, seconds: float) -> OpenError:
+def not_armed(name: str, state: str, seconds: float) -> NoAnswerError:
     """Make the error for a device that does not get to RUN."""
-    return OpenError(
+    return NoAnswerError(
         f"{name}: the device did not arm within {1e3 * seconds:.0f} ms and is in {state}. Commands may "
         "arrive too late (a slow adapter, a busy computer); `dcmp-hil monitor` shows what it counts."
     )

@@ -53,6 +53,17 @@ def test_slower_than_is_waited_for_is_said_as_that(cli: Cli) -> None:
     assert "more than 400 ms" in only_line(outcome)
 
 
+@pytest.mark.parametrize("way", ["both", "up", "down"])
+@pytest.mark.parametrize("seed", range(4))
+def test_line_that_damages_too_much_to_arm_is_told_as_that(cli: Cli, way: str, seed: int) -> None:
+    noise = ("--fault", f"wire.noise:rate=0.03,way={way},at=boot", "--set", f"sim.seed={seed}")
+    board = ("--set", "backend.kind=sim-board", "--viewer", "none", "--no-record")
+    outcome = cli("run", "--fast", "--duration", "1", *board, *noise)
+    assert outcome.code in {3, 4}
+    assert "damage" in outcome.err
+    assert "cable" in outcome.err
+
+
 @contextmanager
 def health_only(carrier: str) -> Iterator[str]:
     """Say nothing but HEALTH, ten times a second and more."""
