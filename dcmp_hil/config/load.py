@@ -113,18 +113,22 @@ def copy_rig(name: str, target: Path) -> list[Path]:
     if target.suffix != ".toml":  # nothing else would be taken for a file when it is loaded
         raise ConfigError(f"{target}: a rig file ends in .toml. Call it {target.name or 'rig'}.toml.")
     schema = target.parent / "rig.schema.json"
-    written = [target]
+    written, made = [target], False
     try:
         with target.open("x", encoding="utf-8") as file:
+            made = True
             file.write(text)
         if not schema.exists():
-            schema.write_text(_FOLDER.joinpath(schema.name).read_text("utf-8"), "utf-8")
             written.append(schema)
+            schema.write_text(_FOLDER.joinpath(schema.name).read_text("utf-8"), "utf-8")
     except FileExistsError:
         raise ConfigError(f"{target}: exists already. Choose another name, or remove it first.") from None
     except FileNotFoundError:
         raise ConfigError(f"{target}: there is no folder {target.parent}. Make it first.") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        if made:
+            for path in written:
+                path.unlink(missing_ok=True)  # half a file
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(f"{target}: {reason}. Choose a place you may write.") from None
     return written

@@ -198,6 +198,13 @@ def test_disk_that_fills_up_is_told_for_each_file_after_the_figures(
     assert "Traceback" not in run.err + export.err + replay.err
 
 
+def test_rig_that_cannot_be_copied_wholly_is_not_there(installed: Path, tmp_path: Path) -> None:
+    done = limited(installed, tmp_path, "rigs", "--copy", "paper", "mine.toml")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == "error: mine.toml: File too large. Choose a place you may write.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_trip_stays_the_end_of_a_run_whose_json_cannot_be_written(installed: Path, tmp_path: Path) -> None:
     (tmp_path / "place").mkdir()
     command = [str(installed), "run", "--duration", "6", "--viewer", "none", "--json", "place/x.json"]
