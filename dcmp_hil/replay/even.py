@@ -21,6 +21,7 @@ _FEWEST = 8  # rows that tell a period
 _AGREES = 0.02  # between a period that is told and the one that the stamps show
 _LOSS = 0.75  # of a period, by which the stamps move on where a row was lost
 _KINDS = 6  # of steps that a coarse clock shows
+_FEWEST_STAMPS = 50  # that tell a period to a thousandth
 _ROUNDING = 1e-6  # s
 _LONGEST = 1e15  # of them
 
@@ -83,11 +84,13 @@ def _coarse(time: Column, repeated: int, name: str, notes: list[str]) -> Column:
     steps = np.diff(time)
     resolution = float(np.quantile(steps[steps > 0.0], 0.95))
     grid = _fit(time, resolution)
-    if grid.spread > resolution + grid.period:
+    uneven = grid.spread > resolution + grid.period
+    if uneven or time[-1] - time[0] < _FEWEST_STAMPS * resolution:
+        why = "the rows are not evenly sampled by them" if uneven else "there are too few different ones"
         raise ConfigError(
-            f"{name}: {repeated} of {len(time)} stamps repeat the one before, and the rows are not evenly "
-            "sampled by them, so they do not tell when a row was taken. If the rows are evenly sampled, say "
-            f"so: --period T (by the stamps, about {grid.period:.4g} s)."
+            f"{name}: {repeated} of {len(time)} stamps repeat the one before, and {why}, so they do not tell "
+            "when a row was taken. If the rows are evenly sampled, say so: --period T (by the stamps, about "
+            f"{grid.period:.3g} s)."
         )
     notes.append(
         _said(grid, f"{repeated} of the stamps repeat the one before (they are {resolution:.4g} s apart)")
@@ -96,22 +99,30 @@ def _coarse(time: Column, repeated: int, name: str, notes: list[str]) -> Column:
 
 
 def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
+    """Return the even grid of a known period, with the rows left out that the stamps show to be lost."""
     steps = np.diff(time)
-    late = float(np.quantile(np.abs(steps - np.median(steps)), 0.9))
-    resolution = max(2.0 * late, float(np.median(steps[steps > 0.0])) if (steps <= 0.0).any() else 0.0)
-    grid = _fit(time, resolution, period)
+    repeated = int(np.count_nonzero(steps <= 0.0))
+    late = 2.0 * float(np.quantile(np.abs(steps - np.median(steps)), 0.9))
+    resolution = max(late, float(np.quantile(steps[steps > 0.0], 0.95)) if repeated else 0.0)
+    few = time[-1] - time[0] < _FEWEST_STAMPS * resolution
+    number = _numbered(time, period, resolution)
+    off = time - period * number
+    grid = _Grid(number, period, float(np.ptp(off))) if few else _fit(time, resolution, period)
     if abs(grid.period / period - 1.0) > _AGREES:
         raise ConfigError(
             f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {period:g} s. Leave "
             "--period out, or say --time none: then the stamps do not count."
         )
     if grid.spread > resolution + grid.period:
-        notes.append(
-            "The rows are not evenly sampled: the stamps are taken, and --period tunes the observer."
-        )
+        if repeated >= _FEW * len(time):
+            raise ConfigError(
+                f"{name}: by the stamps the rows are not evenly sampled, {period:g} s apart: they differ "
+                f"from that by {grid.spread:.4g} s. Say --time none if the stamps do not count."
+            )
+        notes.append("The rows are not evenly sampled: the stamps are taken; --period tunes the observer.")
         return _spread(time)
     lost = int(grid.number[-1]) - len(time) + 1
-    told = f"{lost} lost rows" if lost else "no lost row"
+    told = "no lost row" if not lost else "1 lost row" if lost == 1 else f"{lost} lost rows"
     notes.append(f"Evenly sampled, {period:g} s (--period); the stamps show {told}.")
     return grid.number * period
 

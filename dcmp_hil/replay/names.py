@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.units import SI, any_unit, find_unit, known_unit
+from dcmp_hil.replay.units import SI, bare, find_unit, known_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,6 +47,7 @@ _WHOLE: dict[str, Quantity] = {
     "counts": "position",
 }
 _WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
+_NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
 _NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
 _UNSURE = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
@@ -148,7 +149,7 @@ def match(
     if found is not None:
         return Match(quantity, name, *found, "name")
     told = units[list(header).index(name)] if units else ""
-    if not any_unit(told):
+    if not told or bare(told) in _NO_UNIT or is_format(told):
         return Match(quantity, name, SI[quantity], 1.0, "assumed")
     in_file = find_unit(quantity, told)
     if in_file is None:
@@ -157,6 +158,11 @@ def match(
             f"Say its unit: --{quantity}-unit, or another column: --{quantity}."
         )
     return Match(quantity, name, *in_file, "units")
+
+
+def is_format(told: str) -> bool:
+    """Whether what stands for a unit is how a time is written, such as ``hh:mm:ss.SSS``."""
+    return re.search(r"[hHmM]{1,2}:[mMsS]{1,2}|[yY]{2}", told) is not None
 
 
 def sample_number(header: Sequence[str]) -> str | None:

@@ -87,6 +87,9 @@ def rising(raw: Column, size: float, copies: NDArray[np.bool_], period: float | 
     """
     notes: list[str] = []
     rows = np.arange(len(raw))
+    if np.median(np.diff(raw)) < 0.0:
+        raw, rows, copies = raw[::-1], rows[::-1], np.append([False], copies[:0:-1])
+        notes.append("The rows come in reverse order of their time: read from the last one on.")
     steps = np.diff(raw)
     if not (steps > 0.0).any() and period is not None and not steps.any():
         notes.append(f"Evenly sampled, {period:g} s (--period); all stamps are the same.")
@@ -105,27 +108,36 @@ def rising(raw: Column, size: float, copies: NDArray[np.bool_], period: float | 
         notes.append(f"{_rows(int(doubled.sum()))} left out that the file holds twice.")
     if np.count_nonzero(np.diff(raw) <= 0.0) < _FEW * len(raw):
         raw, rows = _in_order(raw, rows, usual, notes)
-    starts = np.flatnonzero(np.diff(raw) < 0.0) + 1
-    if len(starts):
-        back = size * float(raw[starts[0] - 1] + usual - raw[starts[0]])
-        notes.append(
-            f"The clock goes back in {_places(len(starts))}, the first time by {back:.6g} s: "
-            "a new stretch begins there, and the observer with it."
-        )
+    starts = _starts(raw, size, usual, notes)
     if len(starts) > _FEW * len(raw):
         raise ConfigError(
             f"{name}: the time goes back in {len(starts)} of {len(raw)} rows, so it does not tell when they "
             f"were taken. If they are evenly sampled, say so: --period {period or 'T'} --time none."
         )
-    parts = [
-        even_rows(size * (part - part[0]), period, name, notes) for part in np.split(raw, starts.tolist())
-    ]
+    parts = [even_rows(size * (part - part[0]), period, name, notes) for part in np.split(raw, starts)]
+    time = _joined(parts, size * float(raw[0]))
+    return Stamps(time, rows, tuple(starts), tuple(dict.fromkeys(notes)))
+
+
+def _starts(raw: Column, size: float, usual: float, notes: list[str]) -> list[int]:
+    """Return the rows at which the time goes back."""
+    starts = (np.flatnonzero(np.diff(raw) < 0.0) + 1).tolist()
+    if starts:
+        back = size * float(raw[starts[0] - 1] + usual - raw[starts[0]])
+        notes.append(
+            f"The clock goes back in {_places(len(starts))}, the first time by {back:.6g} s: "
+            "a new stretch begins there, and the observer with it."
+        )
+    return [int(start) for start in starts]
+
+
+def _joined(parts: list[Column], begin: float) -> Column:
+    """Put stretches one behind the other, a usual step apart."""
     typical = float(np.median(np.concatenate([np.diff(part) for part in parts])))
-    time, begin = [size * raw[0] + parts[0]], size * raw[0] + parts[0][-1]
+    time = [begin + parts[0]]
     for part in parts[1:]:
-        time.append(begin + typical + part)
-        begin = float(time[-1][-1])
-    return Stamps(np.concatenate(time), rows, tuple(starts.tolist()), tuple(dict.fromkeys(notes)))
+        time.append(float(time[-1][-1]) + typical + part)
+    return np.concatenate(time)
 
 
 def _unwrapped(raw: Column, size: float, usual: float, notes: list[str]) -> Column:

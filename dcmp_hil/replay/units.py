@@ -27,9 +27,9 @@ _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
     "position": {
         1.0: ("rad", "rads", "radian", "radians"),
         1e-3: ("mrad", "milliradian", "milliradians"),
-        _DEG: ("deg", "degs", "degree", "degrees", "°"),
-        _REV: ("rev", "revs", "revolution", "revolutions", "turn", "turns"),
-        math.nan: (COUNTS, "count", "ticks", "tick", "cts", "lsb"),
+        _DEG: ("deg", "degs", "degree", "degrees", "°", "grad"),
+        _REV: ("rev", "revs", "revolution", "revolutions", "turn", "turns", "umdrehungen"),
+        math.nan: (COUNTS, "count", "ticks", "tick", "cts", "lsb", "inc", "increments", "inkremente"),
     },
     "torque": {
         1.0: ("N m", "newton metre", "newton metres", "newton meter", "newton meters"),
@@ -44,7 +44,7 @@ _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
         1e-3: ("mrad/s", "mrad/sec", "mradps"),
         _DEG: ("deg/s", "deg/sec", "deg per s", "degps", "dps", "°/s"),
         _REV: ("rev/s", "rev/sec", "rev per s", "revps", "rps", "turns/s"),
-        _REV / 60.0: ("rpm", "rev/min", "r/min", "1/min"),
+        _REV / 60.0: ("rpm", "rev/min", "r/min", "1/min", "u/min"),
     },
 }
 SI: dict[Quantity, str] = {quantity: next(iter(sizes.values()))[0] for quantity, sizes in _SPELLINGS.items()}

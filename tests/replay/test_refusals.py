@@ -58,6 +58,16 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         {"counts_per_rev": 2000, "modulus": 100.0},
         "--modulus",
     ),
+    "a unit that is none": (
+        ["time,angle,voltage", "s,gon,V", *(f"{0.002 * k:.3f},{row}" for k, row in enumerate(rising()))],
+        {},
+        "--position-unit",
+    ),
+    "stamps of a second": (
+        ["time,angle_rad,voltage_V", *(f"10:11:{k // 100:02d},{row}" for k, row in enumerate(rising(800)))],
+        {},
+        "--period T",
+    ),
     "a position of words": (
         ["time_s,position_rad,voltage_V", *(f"{0.002 * k:.3f},off,0.5" for k in range(200))],
         {},

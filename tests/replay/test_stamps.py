@@ -212,6 +212,12 @@ case(
     expect=Expect(near=1e-3),
 )
 case("all stamps the same, told", lambda: stamped(lambda _: "1.76723e+09", "time_s"), period=T)
+case("stamps of 1 s, told", lambda: clocked(lambda t: iso(t + 0.3)[:19]), period=T)
+case(
+    "the newest row first",
+    lambda: [HEADER, *reversed(columns().lines())],
+    expect=Expect(note="reverse order"),
+)
 
 
 @pytest.mark.parametrize("name", CASES)
