@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 
-SILENCE_S = 1.0  # without a SAMPLE: the device is gone
+SILENCE_S = 2.0  # without a SAMPLE: the device is gone
 _AGE_US = 3000  # how old the SAMPLE may be that a DRIVE answers
 _FOLLOWS = 0.3  # of a period, each period: by how much the two clocks may differ
 _BURST = 512  # frames that are read without a look at the end
@@ -116,7 +116,7 @@ class Listener:
         Raises
         ------
         SampleTimeoutError
-            If none came for a second.
+            If none came for SILENCE_S.
         """
         first = len(self.samples)
         deadline_ns = self.clock.now_ns() + int(1e9 * SILENCE_S)

@@ -93,8 +93,10 @@ def test_the_virtual_device_passes(script: Script, installed: Path, tmp_path: Pa
     assert done.err.count("\n") == 1
     assert (report["link"], report["armed"], report["ended_by"]) == (link, True, "finished")
     assert [one["name"] for one in report["checks"]] == [check.name for check in CHECKS]
-    assert report["counts"]["passed"] + report["counts"]["not judged"] >= 47
-    assert report["counts"]["passed"] >= 40  # a busy computer is late, and says so
+    judged = {one["name"] for one in report["checks"] if one["verdict"] in {"passed", "other carrier"}}
+    assert {check.name for check in CHECKS if not (check.timed or check.needs_arm)} <= judged
+    late = [one["findings"][0] for one in report["checks"] if one["name"] not in judged]
+    assert all("too late to answer" in reason for reason in late)  # a busy computer says so
     assert sorted(path.name for path in tmp_path.iterdir()) == ["conform.json"]
 
 
