@@ -221,3 +221,27 @@ def test_missing_scipy_is_named_with_the_pip_line(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(__import__("sys").modules, "scipy.signal", None)
     with pytest.raises(ConfigError, match=r"pip install scipy"):
         replay(swing(duration=1.0).recording())
+
+
+def test_a_motion_that_no_arm_makes_is_an_error() -> None:
+    truth = swing()
+    with pytest.raises(ConfigError, match=r"rad/s .*--position-unit.*--modulus"):
+        replay(truth.recording(position=1000.0 * truth.position))
+
+
+def test_an_error_that_no_observer_makes_is_one() -> None:
+    truth = swing()
+    with pytest.raises(ConfigError, match=r"is no figure of an observer.*--ku"):
+        replay(truth.recording(), ReplaySettings(ku=5400.0))
+
+
+def test_an_observer_begins_anew_at_a_break() -> None:
+    truth = swing()
+    shifted = truth.position + np.where(np.arange(len(truth.time)) >= 1000, 5.0, 0.0)
+    result = replay(truth.recording(position=shifted, breaks=(1000,)))
+    assert (result.figures.restarts, result.figures.lost_samples) == (1, 0)
+    assert result.estimates.velocity[1000] == 0.0
+    assert result.estimates.position[1000] == shifted[1000]
+    after = truth.time - truth.time[1000]
+    assert not result.judged[(after >= 0.0) & (after <= 0.3)].any()
+    assert true_error(truth, result) < 0.045
