@@ -14,6 +14,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dcmp_hil.api import run
     from dcmp_hil.backends import Backend
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig, load_rig
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
     from dcmp_hil.model import Model
     from dcmp_hil.observers import Observer, ObserverContext
-    from dcmp_hil.session import Result, run
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.statistics import Summary
     from dcmp_hil.values import Cycle, Estimate, Event, Fault, Reference, Sample, Truth
@@ -45,7 +46,7 @@ _HOMES = {
     "Observer": "dcmp_hil.observers",
     "ObserverContext": "dcmp_hil.observers",
     "Reference": "dcmp_hil.values",
-    "Result": "dcmp_hil.session",
+    "Result": "dcmp_hil.result",
     "Rig": "dcmp_hil.config",
     "Sample": "dcmp_hil.values",
     "Sink": "dcmp_hil.telemetry.recorder",
@@ -53,7 +54,7 @@ _HOMES = {
     "TripError": "dcmp_hil.errors",
     "Truth": "dcmp_hil.values",
     "load_rig": "dcmp_hil.config",
-    "run": "dcmp_hil.session",
+    "run": "dcmp_hil.api",
 }
 
 __all__ = [

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.values import Cycle
 
 

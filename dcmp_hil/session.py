@@ -1,100 +1,38 @@
-"""One run from rig to result: builds the line, runs it, ends it at 0 V, and keeps the figures."""
+"""One run: builds the line, runs it, ends it at 0 V, and keeps the figures."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, OpenError, TripError
+from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
 from dcmp_hil.fault_injection import inject
 from dcmp_hil.host import host_facts, in_words, require_linux
 from dcmp_hil.live.changes import LiveChanges
-from dcmp_hil.realtime import Grant, RealTime
+from dcmp_hil.realtime import RealTime
+from dcmp_hil.result import Result
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.figures import Figures
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.makers import Deferred, deferred, sorted_out
-from dcmp_hil.telemetry.statistics import Statistics, Summary
+from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.trajectory import LOWERING
 from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dcmp_hil.backends.goodbye import DeviceEnd
     from dcmp_hil.config import Rig
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live import Control
-    from dcmp_hil.probe import MotorGain
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
-    from dcmp_hil.wire.quality import Concern, LinkCounters
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What a run leaves behind.
-
-    Parameters
-    ----------
-    rig
-        What was run.
-    summary
-        The figures.
-    columns
-        Every signal of the table, shape (periods,), by name with unit; `time_s` is device time. Empty if
-        columns were not kept.
-    events
-        What happened, in order.
-    dropped
-        Periods that telemetry lost because a sink was slow; they are in no figure.
-    link
-        What was lost or damaged on the way and survived; None where there is no wire.
-    link_concerns
-        What of it is more than `backend.warn_percent` and `backend.warn_clock_percent` allow, and its cause.
-    device_end
-        State and fault in which the device was left; None where there is none, or it did not say.
-    grants
-        What was asked of the operating system and what came of it; empty in virtual time.
-    host
-        What is known of the computer; see `host_facts`.
-    overruns
-        Late periods of the whole run, by what `timing.overrun` calls late.
-    outliers
-        Samples left out because no arm can have been where they say.
-    troubles
-        Its first hundred warnings and errors, with their time; kept where events are not, too.
-    changes
-        What was changed while it went on, in words.
-    motor_gain
-        What the probe found of the motor; None without a probe.
-    """
-
-    rig: Rig
-    summary: Summary
-    columns: dict[str, NDArray[np.float64]]
-    events: tuple[Event, ...]
-    dropped: int = 0
-    link: LinkCounters | None = None
-    link_concerns: tuple[Concern, ...] = ()
-    device_end: DeviceEnd | None = None
-    grants: tuple[Grant, ...] = ()
-    host: dict[str, Any] = field(default_factory=dict)
-    overruns: int = 0
-    outliers: int = 0
-    troubles: tuple[str, ...] = ()
-    changes: tuple[str, ...] = ()
-    motor_gain: MotorGain | None = None
 
 
 _AT_ZERO: tuple[Literal["INFO", "ERROR"], str] = ("INFO", "amplifier at 0 V")
@@ -305,64 +243,6 @@ class Session:
             changes=tuple(getattr(self._line.changes, "made", ())),
             motor_gain=self._line.supervisor.motor_gain,
         )
-
-
-def run(
-    rig: Rig,
-    *,
-    duration: float | None = None,
-    fast: bool = False,
-    window_from: float = 0.0,
-    sinks: Sequence[Sink | SinkMaker] = (),
-    faults: Iterable[object] = (),
-) -> Result:
-    """Run a rig and return its cycles as columns and its figures.
-
-    Parameters
-    ----------
-    rig
-        From `load_rig`.
-    duration
-        s of device time; None takes the rig's own `run.duration_s`; 0 is until Ctrl-C.
-    fast
-        Virtual time instead of the wall's pace (simulated rig only); such runs repeat to the bit.
-    window_from
-        s, device time from which the summary's figures count.
-    sinks
-        Who else looks on: sinks, or better functions that make one, such as
-        ``partial(RerunSink, rig=view_of(rig), record=Path("run.rrd"), viewer="spawn")``. In real time a
-        function that can be pickled is called in the telemetry process, beside the loop; a sink that is there
-        already runs on a thread of this process, which costs the loop its punctuality.
-    faults
-        What goes wrong on purpose on a simulated rig: texts as behind `dcmp-hil run --fault`, such as
-        ``["wire.drop:p=0.2,at=3s,for=1s", "plant.shove:at=2s"]``, or objects
-        ``Fault("plant.shove", at=2.0, rad_s2=300)`` of `sim_backend.faults.fault`, whose `at` may be a
-        function of time and true state. Everything random in them follows from `sim.seed`. Faults of the
-        wire and of the firmware need `backend.kind = "sim-board"`.
-
-    Returns
-    -------
-    Result
-        Columns, summary and events. After Ctrl-C: of what ran until then.
-
-    Raises
-    ------
-    ConfigError
-        If an argument does not fit the rig.
-    TripError
-        If the supervisor stopped the run; `.result` holds what there is of it, `.cycles` its last second.
-    DeadlineError
-        If `timing` enforces real time that is not granted, or ends a late run; with `.result`.
-    BackendError
-        If the device or the way to it fails; with `.result`.
-    """
-    session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks, faults=faults)
-    try:
-        session.run()
-    except DcmpError as error:
-        error.result = session.result()
-        raise
-    return session.result()
 
 
 def _end_after(error: BaseException) -> tuple[Literal["INFO", "ERROR"], str]:

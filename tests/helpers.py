@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.statistics import Summary
     from sim_backend.plant import Plant
 

@@ -21,7 +21,7 @@ from tests.helpers import STEADY, HeldRun, T, bench, known, named
 if TYPE_CHECKING:
     from typing import Self
 
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
 
 _RUNS = Path("runs")
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 

@@ -13,7 +13,7 @@ from dcmp_hil.wire.quality import DeviceCounters
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.statistics import Histogram
 
 _BARS = " ▁▂▃▄▅▆▇█"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
 
 _SETTLED = 0.1  # rad/s: the velocity estimate has arrived when its error stays below this
 

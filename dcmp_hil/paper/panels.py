@@ -12,7 +12,7 @@ from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, REFERENCE, TRUE, VOLTAGE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dcmp_hil.session import Session
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
 
 WINDOW_FROM = 1.0  # s: the paper judges its curves "after one second elapsed"
 

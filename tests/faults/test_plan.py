@@ -26,7 +26,7 @@ from tests.helpers import bench
 from tests.live.here import Here
 
 if TYPE_CHECKING:
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from sim_backend.faults.base import FaultContext
 
 BOARD = "backend.kind=sim-board"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
     from dcmp_hil.values import Sample
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.session import Result
+    from dcmp_hil.result import Result
 
 _AT = 3500  # samples: full authority, the soft start is over
 _IDEAL = (

@@ -1,0 +1,74 @@
+"""What a run leaves behind: figures, columns, events, and how device and link fared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dcmp_hil.backends.goodbye import DeviceEnd
+    from dcmp_hil.config import Rig
+    from dcmp_hil.probe import MotorGain
+    from dcmp_hil.realtime import Grant
+    from dcmp_hil.telemetry.statistics import Summary
+    from dcmp_hil.values import Event
+    from dcmp_hil.wire.quality import Concern, LinkCounters
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a run leaves behind.
+
+    Parameters
+    ----------
+    rig
+        What was run.
+    summary
+        The figures.
+    columns
+        Every signal of the table, shape (periods,), by name with unit; `time_s` is device time. Empty if
+        columns were not kept.
+    events
+        What happened, in order.
+    dropped
+        Periods that telemetry lost because a sink was slow; they are in no figure.
+    link
+        What was lost or damaged on the way and survived; None where there is no wire.
+    link_concerns
+        What of it is more than `backend.warn_percent` and `backend.warn_clock_percent` allow, and its cause.
+    device_end
+        State and fault in which the device was left; None where there is none, or it did not say.
+    grants
+        What was asked of the operating system and what came of it; empty in virtual time.
+    host
+        What is known of the computer; see `host_facts`.
+    overruns
+        Late periods of the whole run, by what `timing.overrun` calls late.
+    outliers
+        Samples left out because no arm can have been where they say.
+    troubles
+        Its first hundred warnings and errors, with their time; kept where events are not, too.
+    changes
+        What was changed while it went on, in words.
+    motor_gain
+        What the probe found of the motor; None without a probe.
+    """
+
+    rig: Rig
+    summary: Summary
+    columns: dict[str, NDArray[np.float64]]
+    events: tuple[Event, ...]
+    dropped: int = 0
+    link: LinkCounters | None = None
+    link_concerns: tuple[Concern, ...] = ()
+    device_end: DeviceEnd | None = None
+    grants: tuple[Grant, ...] = ()
+    host: dict[str, Any] = field(default_factory=dict)
+    overruns: int = 0
+    outliers: int = 0
+    troubles: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
+    motor_gain: MotorGain | None = None
