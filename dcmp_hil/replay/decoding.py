@@ -1,4 +1,4 @@
-"""From the bytes of a recording to its lines, whatever program wrote them."""
+"""From the bytes of a recording to its lines, in any usual encoding."""
 
 from __future__ import annotations
 
