@@ -85,8 +85,8 @@ def test_run_shows_every_figure_when_on_screen(cli: Cli) -> None:
 
 
 def test_run_exits_4_and_keeps_black_box_when_it_trips(cli: Cli, tmp_path: Path) -> None:
-    step = ("--set", "reference.kind=step", "--set", "reference.at_s=3.0")
-    outcome = cli("run", "--fast", "--duration", "5", *step, "--set", "supervisor.velocity_limit_rad_s=2")
+    shove = ("--fault", "plant.shove:at=3s,for=100ms", "--set", "supervisor.disturbance_limit_rad_s2=1000")
+    outcome = cli("run", "--fast", "--duration", "5", *shove, "--set", "supervisor.velocity_limit_rad_s=2")
     (folder,) = (tmp_path / "runs").iterdir()
     figures = json.loads((folder / "summary.json").read_text())
     with (folder / "black_box.csv").open() as file:

@@ -78,7 +78,8 @@ def test_change_is_read_back_and_what_is_applied_is_the_new_state(rig: _Rig, tmp
             {"do": "status"},
         )
     )
-    assert said == {"ok": True, "said": "controller.kp_1_s2: 4000 -> 5200, applied at 3.250 s", "t": 3.25}
+    words = "controller.kp_1_s2: 4000 -> 5200, applied at 3.250 s"
+    assert said == {"ok": True, "said": words, "t": 3.25, "warnings": []}
     assert refused["ok"] is False
     values = {knob["key"]: knob["value"] for knob in state["knobs"]}
     assert (values["controller.kp_1_s2"], values["controller.kd_1_s"]) == (5200.0, 130.0)
