@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import random
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,6 +14,12 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.settable import changed, doubts
 from tests.helpers import bench
 from tools.typed_numbers import Typed, draw, judge
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tests.installed import Finished
 
 pytestmark = pytest.mark.usefixtures("untraced")
 
@@ -74,3 +82,24 @@ def test_set_says_the_warnings_that_run_says() -> None:
 def test_limits_that_the_start_alone_would_pass_are_refused(override: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         load_rig("bench-1khz", [override])
+
+
+def test_run_beyond_reach_ends_well_and_says_what_was_limited(
+    script: Callable[..., Finished], tmp_path: Path
+) -> None:
+    done = script(
+        "run", "--fast", "--duration", "6", "--viewer", "none", "--json", "figures.json",
+        "--set", "reference.amplitude_rad=200", "--set", "sim.plant.ku_rad_s2_V=9.99", cwd=tmp_path,
+    )  # fmt: skip
+    said = " ".join(done.err.split())
+    assert done.code == 0, done.err
+    assert "Traceback" not in done.err
+    assert "will be held at 5.969 rad" in said
+    assert "times [model]'s 5.4" in said
+    figures = json.loads((tmp_path / "figures.json").read_text("utf-8"))
+    assert figures["ended_by"] == "duration"
+    assert figures["motor_gain"]["model_rad_s2_V"] == 5.4
+    assert figures["motor_gain"]["ratio"] == pytest.approx(1.85, rel=0.1)
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert (folder / "run.mcap").stat().st_size > 0
+    assert not (folder / "black_box.csv").exists()
