@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from queue import Empty, Queue
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +12,11 @@ import rerun.blueprint as rrb
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.blueprint import TIMELINE, opened, plot
+from dcmp_hil.telemetry.outlet import THREAD
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, FAINT, REFERENCE, TRUE, VOLTAGE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -28,6 +32,7 @@ _STYLES = {
 }
 _OTHERS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT)
 _FLUSH = 30.0  # s
+_STEP = 40.0  # s for one plot
 
 
 def write_series(
@@ -59,16 +64,43 @@ def write_series(
     layout = opened(rrb.Vertical(*(plot(name, window=None) for name in plots)), follow=False)
     stream = rr.RecordingStream(application)
     times = [rr.TimeColumn(TIMELINE, duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
-    try:
+
+    def steps() -> Iterator[None]:
         stream.set_sinks(rr.FileSink(path), default_blueprint=layout)
         stream.send_blueprint(layout)
         stream.send_recording_name(path.stem)
         for name, lines in plots.items():
             _send(stream, name, times, {k: v for k, v in lines.items() if not np.isnan(v).all()})
+            yield
         stream.flush(timeout_sec=_FLUSH)
+        yield
         stream.disconnect()
-    except RuntimeError as error:  # a file that can be opened, on a disk that is full
-        raise ConfigError(f"{path}: {error}. Free some space, or choose another disk.") from None
+
+    problem = _error_of(steps())
+    if problem is not None:
+        raise ConfigError(f"{path}: {problem}. Free some space, or choose another disk.")
+
+
+def _error_of(steps: Iterator[None]) -> Exception | None:
+    """Take steps on a thread, as Rerun may never return where the disk is full; return their error."""
+    answers: Queue[Exception | bool] = Queue()
+
+    def take() -> None:
+        try:
+            for _ in steps:
+                answers.put(True)
+        except Exception as error:  # noqa: BLE001 - told to the caller
+            answers.put(error)
+            threading.Event().wait()  # to leave would end the stream, which waits for the disk for ever
+        answers.put(False)
+
+    threading.Thread(target=take, name=THREAD, daemon=True).start()
+    try:
+        while (answer := answers.get(timeout=_STEP)) is True:
+            pass
+    except Empty:
+        return TimeoutError("the disk takes nothing any more")
+    return answer if isinstance(answer, Exception) else None
 
 
 def _send(
