@@ -132,12 +132,11 @@ def test_run_ends_well_when_its_terminal_is_closed(installed: Path, tmp_path: Pa
     assert figures["troubles"] == []
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "ascii:strict"])
-def test_run_prints_figures_in_any_encoding(script: Script, tmp_path: Path, encoding: str) -> None:
+def test_run_prints_figures_in_an_encoding_that_lacks_signs(script: Script, tmp_path: Path) -> None:
     done = script(
         *("run", "--fast", "--duration", "1", "--viewer", "none"),
-        env={"PYTHONIOENCODING": encoding},
-        encoding=encoding.partition(":")[0],
+        env={"PYTHONIOENCODING": "latin-1:strict"},
+        encoding="latin-1",
     )
     assert done.code == 0
     assert kept(tmp_path)["periods"] == 1000
