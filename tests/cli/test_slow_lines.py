@@ -53,6 +53,7 @@ def test_slower_than_is_waited_for_is_said_as_that(cli: Cli) -> None:
     assert "more than 400 ms" in only_line(outcome)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("way", ["both", "up", "down"])
 @pytest.mark.parametrize("seed", range(4))
 def test_line_that_damages_too_much_to_arm_is_told_as_that(cli: Cli, way: str, seed: int) -> None:

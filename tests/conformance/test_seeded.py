@@ -51,6 +51,7 @@ def test_other_periods_pass_too(period_us: int) -> None:
     assert {one.check.name: one.findings for one in outcomes if one.findings} == {}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("error", SEEDS, ids=str)
 def test_a_seeded_error_is_found_by_its_check(error: str) -> None:
     make, carrier, name = SEEDS[error]

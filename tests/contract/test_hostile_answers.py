@@ -99,6 +99,7 @@ _ROWS: list[tuple[str, Lie, str]] = [
 ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("lie", "words"), [row[1:] for row in _ROWS], ids=[row[0] for row in _ROWS])
 def test_an_answer_that_cannot_be_is_a_sentence_and_leaves_the_device_free(lie: Lie, words: str) -> None:
     with on_bench("sim-board can", _FAST) as bench:
