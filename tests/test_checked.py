@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from dcmp_hil import BackendError, Estimate, Sample, TripError, Truth, run
-from dcmp_hil.plugins.checked import CheckedBackend, CheckedController, CheckedObserver, plain_number
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
+from dcmp_hil.plugins.checked_backend import CheckedBackend
+from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.values import Reference
 from sim_backend.backend import SimBackend
 from tests.helpers import STEADY, HeldRun, bench, named

@@ -9,7 +9,7 @@ from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.plugins import find_named, make
-from dcmp_hil.plugins.checked import CheckedBackend
+from dcmp_hil.plugins.checked_backend import CheckedBackend
 from dcmp_hil.plugins.roles import BACKEND
 
 if TYPE_CHECKING:

@@ -1,29 +1,24 @@
 """Stages of the user's own, with what they return checked once a period.
 
 An observer or a controller that raises, or returns what it may not, goes on as NaN, and its `trip` names
-class, file and line: the supervisor finds it in the same period and sends 0 V. A backend ends the
-run by an error.
+class, file and line: the supervisor finds it in the same period and sends 0 V.
 """
 
 from __future__ import annotations
 
 import math
-import operator
-from numbers import Real
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
-from dcmp_hil.errors import BackendError, DcmpError, TripError
-from dcmp_hil.plugins.words import file_of, message_of, place_of, place_of_code, shown_value
-from dcmp_hil.values import Estimate, Fault, Sample, Truth
+from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.plugins.numbers import plain_number
+from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
+from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from types import TracebackType
 
-    from dcmp_hil.values import Reference
+    from dcmp_hil.values import Reference, Sample
 
-_REMEDY = "Correct it there."
-_CODES = (Fault, int)
 _NO_ESTIMATE = Estimate(math.nan, math.nan, math.nan)
 
 
@@ -150,150 +145,9 @@ class CheckedController:
         return number
 
 
-class CheckedBackend:
-    """A backend of the user's own; what else it has than the methods of a backend is passed through.
-
-    Parameters
-    ----------
-    inner
-        The backend.
-    name
-        `module:Factory`, for the message.
-
-    Attributes
-    ----------
-    inner
-        As given.
-    """
-
-    def __init__(self, inner: Any, name: str) -> None:
-        self.inner, self._name = inner, name
-        self._read: Callable[[], Sample] = inner.read
-        self._write: Callable[[float], None] = inner.write
-        self._truth: Callable[[], Truth] = inner.truth
-
-    def __getattr__(self, name: str) -> Any:
-        """Return what else the backend has, such as counters of its link."""
-        return getattr(self.inner, name)
-
-    def __enter__(self) -> Self:
-        """Open the device."""
-        try:
-            self.inner.__enter__()
-        except DcmpError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._failed(error, self.inner.__enter__) from error
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Drive 0 V, disarm, close; a failure of that is a note where something was wrong before."""
-        try:
-            self.inner.__exit__(kind, error, trace)
-        except DcmpError:
-            raise
-        except (Exception, SystemExit) as failure:
-            said = self._failed(failure, self.inner.__exit__)
-            if error is None:
-                raise said from failure
-            error.add_note(str(said))
-
-    def read(self) -> Sample:
-        """Wait for the next sample.
-
-        Raises
-        ------
-        BackendError
-            If the backend raises, or returns anything but a Sample of numbers.
-        """
-        try:
-            sample = self._read()
-        except DcmpError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._failed(error, self._read) from error
-        if type(sample) is Sample:
-            t, position, voltage, fault = sample
-            if type(t) is type(position) is type(voltage) is float and type(fault) in _CODES:
-                return sample
-        return self._converted(sample)
-
-    def write(self, voltage: float) -> None:
-        """Send a voltage, V.
-
-        Raises
-        ------
-        BackendError
-            If the backend raises.
-        """
-        try:
-            self._write(voltage)
-        except DcmpError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._failed(error, self._write) from error
-
-    def truth(self) -> Truth:
-        """Return what a simulation knows at the last sample; NaN on a real device.
-
-        Raises
-        ------
-        BackendError
-            If the backend raises, or returns anything but a Truth of numbers.
-        """
-        try:
-            truth = self._truth()
-        except DcmpError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._failed(error, self._truth) from error
-        if isinstance(truth, Truth):
-            numbers = [number for value in truth if (number := plain_number(value)) is not None]
-            if len(numbers) == len(truth):
-                return Truth(*numbers)
-        raise self._wrong(truth, "Truth(position, velocity, disturbance)", "truth", self._truth)
-
-    def _converted(self, sample: Any) -> Sample:
-        if isinstance(sample, Sample):
-            t, position, voltage = (plain_number(value) for value in sample[:3])
-            fault = _whole_number(sample.fault)
-            if t is not None and position is not None and voltage is not None and fault is not None:
-                return Sample(t, position, voltage, fault)
-        raise self._wrong(sample, "Sample(t, position, voltage), numbers", "read", self._read)
-
-    def _failed(self, error: BaseException, method: Callable[..., Any]) -> BackendError:
-        where = place_of(error, file_of(method)) or place_of_code(method)
-        return BackendError(f"{self._name} raised {message_of(error)}{_at(where)}. {_REMEDY}")
-
-    def _wrong(self, value: object, expected: str, name: str, method: Callable[..., Any]) -> BackendError:
-        where = _at(place_of_code(method))
-        return BackendError(
-            f"{self._name}.{name} returned {shown_value(value)}{where}; expected {expected}. {_REMEDY}"
-        )
-
-
-def plain_number(value: object) -> float | None:
-    """Return a number as a float, NaN and infinity too; None for what is no number, or too large for one."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return None
-    try:
-        return float(value)
-    except (OverflowError, TypeError, ValueError):
-        return None
-
-
-def _whole_number(value: object) -> int | None:
-    try:
-        return operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        return None
-
-
 def _raised(name: str, method: Callable[..., Any], error: BaseException, t: float | None = None) -> TripError:
     where = place_of(error, file_of(method)) or place_of_code(method)
-    trip = TripError("plugin", f"{name} raised {message_of(error)}{_at(where)}{_when(t)}.", _REMEDY)
+    trip = TripError("plugin", f"{name} raised {message_of(error)}{at(where)}{_when(t)}.", REMEDY)
     trip.__cause__ = error  # for Python, which shows the traceback
     return trip
 
@@ -301,21 +155,17 @@ def _raised(name: str, method: Callable[..., Any], error: BaseException, t: floa
 def _wrong(
     name: str, method: Callable[..., Any], value: object, expected: str, t: float | None = None
 ) -> TripError:
-    where = _at(place_of_code(method))
+    where = at(place_of_code(method))
     sentence = f"{name}.update returned {shown_value(value)}{where}{_when(t)}; expected {expected}."
-    return TripError("plugin", sentence, _REMEDY)
+    return TripError("plugin", sentence, REMEDY)
 
 
 def _not_finite(name: str, method: Callable[..., Any], value: object, t: float | None = None) -> TripError:
     return TripError(
         "not_finite",
-        f"{name}.update returned {shown_value(value)}{_at(place_of_code(method))}{_when(t)}.",
+        f"{name}.update returned {shown_value(value)}{at(place_of_code(method))}{_when(t)}.",
         "Look for a division by zero, a missing value, or a gain that makes it diverge.",
     )
-
-
-def _at(where: str) -> str:
-    return f" ({where})" if where else ""
 
 
 def _when(t: float | None) -> str:

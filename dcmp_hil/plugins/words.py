@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 _HERE = str(Path(__file__).parent)
 _LONGEST = 300  # characters of a message
 _LONGEST_VALUE = 60
+REMEDY = "Correct it there."
 
 
 def message_of(error: BaseException) -> str:
@@ -100,3 +101,8 @@ def _lines(trace: TracebackType | None) -> list[tuple[str, int]]:
             found.append((file, trace.tb_lineno))
         trace = trace.tb_next
     return found
+
+
+def at(where: str) -> str:
+    """Return a place in brackets behind a space; nothing for no place."""
+    return f" ({where})" if where else ""
