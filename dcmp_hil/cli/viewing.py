@@ -28,7 +28,7 @@ def attach(port: int | None, *, web: bool) -> None:
             f"Nobody serves a run on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
         )
     if web:
-        with web_viewer(place):
+        with suppress(KeyboardInterrupt), web_viewer(place):
             _until_it_ends(place)
     elif problem := display_problem():
         raise ConfigError(
@@ -58,6 +58,5 @@ def find_served() -> int:
 
 
 def _until_it_ends(port: int) -> None:
-    with suppress(KeyboardInterrupt):
-        while window.speaks_http2(port):
-            pause(_PAUSE)
+    while window.speaks_http2(port):
+        pause(_PAUSE)
