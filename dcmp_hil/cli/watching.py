@@ -85,23 +85,22 @@ def pages(port: int) -> Iterator[str]:
     """Serve the web viewer of what is served on `port`; yield its address, nothing where that fails."""
     problem = f"no port from {window.WEB_PORT} on is free on {window.LOOPBACK}"
     process, address = None, ""
-    for web_port in window.free_ports(window.WEB_PORT):
-        try:
-            process = window.start_web_viewer(web_port, port)
-        except OSError as error:
-            problem = str(error)
-            break
-        if window.serves(web_port, process.pid, _START):
-            address = window.web_url(web_port, port)
-            break
-        process.kill()  # another process took the port first
-        problem = f"its pages are not served, exit code {process.wait()}"
-        process = None
-    if not address:
-        console.warn(f"No web viewer ({problem}); to watch: dcmp-hil view")
     try:
+        for web_port in window.free_ports(window.WEB_PORT):
+            try:
+                process = window.start_web_viewer(web_port, port)
+            except OSError as error:
+                problem = str(error)
+                break
+            if window.serves(web_port, process.pid, _START):
+                address = window.web_url(web_port, port)
+                break
+            process.kill()  # another process took the port first
+            problem = f"its pages are not served, exit code {process.wait()}"
+        if not address:
+            console.warn(f"No web viewer ({problem}); to watch: dcmp-hil view")
         yield address
-    finally:
+    finally:  # after Ctrl-C while it starts, too
         if process is not None:
             process.kill()  # it keeps nothing, and the telemetry process has it ignore SIGTERM
             process.wait()
