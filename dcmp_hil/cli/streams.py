@@ -29,6 +29,8 @@ class _Descriptor(io.FileIO):
     ----------
     number
         Of the descriptor; it is never closed.
+    replaced
+        The stream that wrote there before. It is kept: collected, it would close the descriptor.
 
     Attributes
     ----------
@@ -36,9 +38,10 @@ class _Descriptor(io.FileIO):
         Whether it was led there.
     """
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, replaced: TextIO | None = None) -> None:
         super().__init__(number, "wb", closefd=False)
         self.failed = False
+        self.replaced = replaced
 
     def write(self, data: ReadableBuffer, /) -> int:
         """Write, or drop, all of `data`; a pipe that is full is waited for, even one that does not block."""
@@ -91,11 +94,13 @@ def _guarded(stream: TextIO | None, number: int) -> TextIO:
         own = stream.fileno() == number and not isinstance(_raw(stream), _Descriptor)
     except (OSError, ValueError):
         own = False  # a program that calls us put it there
-    return _text(number, stream.encoding, line_buffering=bool(stream.line_buffering)) if own else stream
+    if not own:
+        return stream
+    return _text(number, stream.encoding, line_buffering=bool(stream.line_buffering), replaced=stream)
 
 
-def _text(number: int, encoding: str, *, line_buffering: bool) -> TextIO:
-    binary = io.BufferedWriter(_Descriptor(number))
+def _text(number: int, encoding: str, *, line_buffering: bool, replaced: TextIO | None = None) -> TextIO:
+    binary = io.BufferedWriter(_Descriptor(number, replaced))
     return io.TextIOWrapper(binary, encoding=encoding, errors=_ERRORS, line_buffering=line_buffering)
 
 

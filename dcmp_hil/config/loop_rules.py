@@ -22,6 +22,13 @@ _QUIET = 0.25  # of the voltage limit, that the encoder's count alone may cost (
 _GROWTH, _SWINGS = 0.1, 0.1  # 1/s; of the velocity limit
 _BLAMED = (
     ("loop", "rate_hz"),
+    ("loop", "delay_samples"),
+    ("amplifier", "voltage_limit_V"),
+    ("encoder", "counts_per_rev"),
+    ("model", "ku_rad_s2_V"),
+    ("model", "f0_1_s"),
+    ("model", "gravity_rad_s2"),
+    ("controller", "position"),
     ("controller", "kp_1_s2"),
     ("controller", "kd_1_s"),
     ("observer", "L1_1_s"),

@@ -8,6 +8,7 @@ import pty
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -213,3 +214,19 @@ def wait_for(what: Callable[[], bool]) -> None:
     while not what():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_stream_that_is_replaced_does_not_close_its_descriptor(tmp_path: Path) -> None:
+    """A program that forks us may have made its own `sys.stderr` on descriptor 2."""
+    program = (
+        "import gc, os, sys\n"
+        "sys.stderr = os.fdopen(2, 'w')\n"
+        "from dcmp_hil.cli import streams\n"
+        "streams.guard()\n"
+        "gc.collect()\n"
+        "print('still there', file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    assert done.stderr == "still there\n"
