@@ -143,6 +143,7 @@ class LinearLoop:
             inside, outside = (middle, outside) if self.stable(10.0**middle) else (inside, middle)
         return float(10.0**inside)
 
+    @np.errstate(all="ignore")  # gains beyond all reason overflow, and are refused by what comes of it
     def _period(self, s: Matrix, motor: float) -> Matrix:
         """Carry states (as rows of `s`) over one period: the line of the loop, and then the plant."""
         model, step, tuning = self._spec.model, self._spec.period, self._tuning

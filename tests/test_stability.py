@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from dcmp_hil import load_rig, run
 from dcmp_hil.config.loop_rules import loops
 from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.live.settable import changed
 from dcmp_hil.session import Session
 from tests.helpers import bench, known
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def test_margins_of_the_default_are_those_that_were_measured() -> None:
@@ -98,3 +104,38 @@ def test_gains_that_explicit_euler_cannot_bear_are_refused(override: str, words:
     load_rig("bench-1khz", ["observer.kind=paper"])
     with pytest.raises(ConfigError, match=words):
         load_rig("bench-1khz", ["observer.kind=paper", override])
+
+
+def test_gains_that_overflow_are_refused_without_a_word_of_numpy(recwarn: pytest.WarningsRecorder) -> None:
+    with pytest.raises(ConfigError, match="ku_rad_s2_V"):
+        load_rig("bench-1khz", ["model.ku_rad_s2_V=5e-324"])
+    assert not recwarn.list
+
+
+WALK = (0, 3, -1, 6, 6, -3, 1, -6, 0, 6, -6, 3, 6, 1, 0, -6, 6, 0, -3, 6, 0, 0)
+
+
+def led_to_its_limits(folder: Path, *overrides: str) -> str:
+    """Run along a reference that jumps to both limits; return the reason of a trip, or nothing."""
+    file = folder / "jumps.csv"
+    rows = "".join(f"{0.2 * k:.1f},{where}\n" for k, where in enumerate(WALK))
+    file.write_text("time_s,position_rad\n" + rows)
+    rig = load_rig("bench-1khz", ["reference.kind=csv", f"reference.file={file}", *overrides])
+    try:
+        Session(rig, duration=5.0, fast=True, keep_columns=False).run()
+    except TripError as trip:
+        return trip.reason
+    return ""
+
+
+@pytest.mark.parametrize("counts", [256, 4096, 65_536])
+def test_an_observer_that_gravity_leaves_behind_is_refused(tmp_path: Path, counts: int) -> None:
+    encoder = f"encoder.counts_per_rev={counts}"
+    for overrides in (["observer.mu0_rad_s=0"], ["observer.mu0_rad_s=2", "observer.M_rad_s3=100"]):
+        with pytest.raises(ConfigError, match=r"observer\.mu0_rad_s: got [02]; a floor below 4 rad/s"):
+            load_rig("bench-1khz", [encoder, *overrides])
+    with pytest.raises(ConfigError, match="a floor below 4 rad/s"):
+        changed(load_rig("bench-1khz", [encoder]), ["observer.mu0_rad_s=1e-3", "observer.M_rad_s3=0.1"])
+    assert led_to_its_limits(tmp_path, encoder, "observer.mu0_rad_s=4") not in ("travel", "speed")
+    if counts >= 4096:  # the remedy
+        assert not led_to_its_limits(tmp_path, encoder, "observer.mu0_rad_s=0", "observer.M_rad_s3=281")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from statistics import median, quantiles
 
 _WINDOW = 256  # ticks
 _QUIET = 2.5e-3  # of a slope: a spread that says nothing against the median
-_FEWEST, _MOST = 4, 512  # slopes: fewer say nothing, more would add nothing
+_SPREAD = 1.1  # of the median: as much as a clock shows that goes wrong in the middle of what is looked at
+_FEWEST, _NEWEST = 4, 12  # slopes: fewer say nothing, and older ones nothing of the clock as it goes now
 
 
 class ClockRatio:
@@ -14,7 +16,8 @@ class ClockRatio:
 
     A sample may arrive late and never early, so the earliest arrival of a window of 256 ticks shows the
     shortest delay of the line. How that moves from window to window is the error of the clock; the median
-    over windows leaves out those in which this computer stood still.
+    over the newest twelve leaves out those in which this computer stood still. A clock that goes wrong later,
+    in whichever minute of a run, shows two seconds later at 1 kHz.
 
     Parameters
     ----------
@@ -28,7 +31,7 @@ class ClockRatio:
         self._earliest = 0.0  # ns, arrival after the nominal instant: the smallest of this window
         self._tick = 0  # at which it was
         self._before: tuple[int, float] | None = None  # the same of the window before
-        self._slopes: list[float] = []
+        self._slopes: deque[float] = deque(maxlen=_NEWEST)
 
     def add(self, tick: int, heard_ns: int) -> None:
         """Take a sample's tick, and the instant of its arrival."""
@@ -46,12 +49,12 @@ class ClockRatio:
             return None
         longer = median(self._slopes)  # a nominal period takes so much longer than it should
         first, _, third = quantiles(self._slopes, n=4)
-        if third - first > max(abs(longer), _QUIET):
+        if third - first > max(_SPREAD * abs(longer), _QUIET):
             return None  # this computer stood still too often to tell
         return 1.0 / (1.0 + longer) - 1.0
 
     def _close_window(self, tick: int) -> None:
-        if self._ends and len(self._slopes) < _MOST:
+        if self._ends:
             if self._before is not None:
                 apart = self._tick - self._before[0]
                 if apart > 0:

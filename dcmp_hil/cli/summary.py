@@ -57,7 +57,8 @@ def _figures(result: Result) -> Table:
 
 def _link(result: Result) -> list[tuple[str, str, str]]:
     """Return the rows of a link; what was warned of in yellow."""
-    link, causes = result.link, {concern.cause for concern in result.link_concerns}
+    link, shares = result.link, {concern.cause: concern.share for concern in result.link_concerns}
+    causes = set(shares)
     assert link is not None  # noqa: S101 - the caller looked
     device = link.device or DeviceCounters()
     damaged = f"frames here, {_at_least(device, 'crc_errors')} at the device"
@@ -72,12 +73,16 @@ def _link(result: Result) -> list[tuple[str, str, str]]:
             str(link.missed),
             f"periods, {link.late} late here",
         ),
-        (_told("damaged", {"commands_damaged", "samples_damaged"} & causes), str(link.corrupt), damaged),
+        (
+            _told("damaged", {"commands_damaged", "samples_damaged"} & causes),
+            str(link.corrupt),
+            damaged,
+        ),
     ]
     if link.limited:
         rows.append(("commands limited", str(link.limited), "clamped or slewed by the device"))
-    if link.clock_error is not None and "device_clock" in causes:
-        rows.append(("[yellow]device's clock", f"{1e2 * link.clock_error:+.2f}", "% fast"))
+    if "device_clock" in causes:
+        rows.append(("[yellow]device's clock", f"{1e2 * shares['device_clock']:+.2f}", "% fast"))
     if result.device_end and result.device_end.fault:
         rows.append(("[yellow]device's end", result.device_end.fault, "a fault of its own"))
     return rows

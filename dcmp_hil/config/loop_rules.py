@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _LEAST, _MOST = 0.8, 1.25  # times the believed motor gain, between which the loop must be stable
 _QUIET = 0.25  # of the voltage limit, that the encoder's count alone may cost (standard deviation)
+_SLOWEST = 4.0  # rad/s, of the observer's floor: below it an arm that is led to its limits overshoots them
 _GROWTH, _SWINGS = 0.1, 0.1  # 1/s; of the velocity limit
 _BLAMED = (
     ("loop", "rate_hz"),
@@ -33,8 +34,8 @@ _BLAMED = (
     ("controller", "kd_1_s"),
     ("observer", "L1_1_s"),
     ("observer", "L2_1_s2"),
-    ("observer", "M_rad_s3"),
     ("observer", "mu0_rad_s"),
+    ("observer", "M_rad_s3"),
 )
 
 
@@ -64,6 +65,8 @@ def _fault(rig: Rig) -> str:
         return ""
     if isinstance(rig.observer, PaperSettings):
         return _euler_fault(rig, rig.observer)
+    if isinstance(rig.observer, SuperTwistingSettings) and (fault := _slow_fault(rig, rig.observer)):
+        return fault
     for loop in loops(rig):
         if not (loop.stable() and loop.stable(_LEAST) and loop.stable(_MOST)):
             return _unstable(loop)
@@ -75,6 +78,20 @@ def _fault(rig: Rig) -> str:
                 "amplifier.voltage_limit_V. Lower controller.kd_1_s, observer.mu0_rad_s or observer.M_rad_s3."
             )
     return ""
+
+
+def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
+    """Name a differentiator that gravity leaves behind: neither its floor nor its slope follows the arm."""
+    tuning = observer.tuning(ObserverContext(rig.model.values(), rig.period, rig.encoder.counts))
+    fastest = rig.model.gravity_rad_s2 * rig.supervisor.velocity_limit_rad_s
+    if observer.mu0_rad_s is None or tuning.mu0 >= _SLOWEST or fastest <= tuning.M:
+        return ""
+    return (
+        f"a floor below {number(_SLOWEST)} rad/s does not follow what gravity does to an arm that moves "
+        "fast, and it passes its limits. Raise observer.mu0_rad_s, or leave it out; where the encoder is "
+        f"fine enough, observer.M_rad_s3 = {fastest:.4g}, gravity times supervisor.velocity_limit_rad_s, "
+        "does it too."
+    )
 
 
 def _euler_fault(rig: Rig, observer: PaperSettings) -> str:

@@ -49,12 +49,15 @@ def kinds_in_words(section: str) -> str:
 def for_text(key: str, text: str, schema: Mapping[str, Any]) -> str:
     """Say what a text that is not allowed may have been meant to be."""
     branches = [schema, *schema.get("anyOf", [])]
-    words = [
-        word for one in branches for word in (*one.get("enum", ()), one.get("const")) if word is not None
-    ]
+    words = {
+        str(word): word
+        for one in branches
+        for word in (*one.get("enum", ()), one.get("const"))
+        if word is not None
+    }
     close = get_close_matches(text, words, n=1)
     if close:
-        return f"Did you mean {toml_value(close[0])}?"
+        return f"Did you mean {toml_value(words[close[0]])}?"
     return _quoted_number(key, text) if any(one.get("type") == "number" for one in branches) else ""
 
 

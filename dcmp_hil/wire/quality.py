@@ -97,7 +97,7 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
     """
     periods = max(1, counters.samples + counters.lost)
     found = [
-        Concern(cause, count / periods, text.format(count=count, share=_percent(count / periods)))
+        _concern(cause, count, periods if cause != "samples_damaged" else counters.samples + count, text)
         for cause, count, text in _losses(counters)
         if count > most * periods and (count >= _FEWEST or (count >= _FEW and count > _LARGE * periods))
     ]
@@ -109,6 +109,11 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
         way = "fast" if error > 0 else "slow"
         found.append(Concern("device_clock", error, _CLOCK.format(share=_percent(abs(error)), way=way)))
     return found
+
+
+def _concern(cause: str, count: int, of: int, text: str) -> Concern:
+    share = min(1.0, count / of)  # noise makes several frames of one, and a device sends more than SAMPLEs
+    return Concern(cause, share, text.format(count=count, share=_percent(share)))
 
 
 def _losses(counters: LinkCounters) -> list[tuple[str, int, str]]:

@@ -33,6 +33,17 @@ def test_clock_is_found_in_spite_of_lateness(error: float, seed: int) -> None:
     assert found == pytest.approx(error, abs=0.002 * (1 + abs(error)))
 
 
+@pytest.mark.parametrize("right", [2000, 300_000])
+@pytest.mark.parametrize("error", [0.02, -0.02, 0.008])
+def test_clock_that_goes_wrong_later_is_found_within_2200_ticks(right: int, error: float) -> None:
+    ratio = ClockRatio(PERIOD)
+    for tick in range(0, right, 1 if right < 10_000 else 16):
+        ratio.add(tick, round(tick * PERIOD))
+    for tick in range(2200):
+        ratio.add(right + tick, round((right + tick / (1.0 + error)) * PERIOD))
+    assert ratio.error == pytest.approx(error, rel=0.01)
+
+
 def test_clock_is_not_known_at_once() -> None:
     assert arrivals(0.1, 600).error is None
 

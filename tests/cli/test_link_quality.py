@@ -32,11 +32,12 @@ def fly(
     *faults: str,
     sets: tuple[str, ...] = (),
     options: tuple[str, ...] = ("--no-record",),
+    seconds: float = 2,
 ) -> tuple[Any, dict[str, Any]]:
-    """Run 2 s in virtual time; return what was printed, and the figures."""
+    """Run some seconds in virtual time; return what was printed, and the figures."""
     words = [word for fault in faults for word in ("--fault", fault)]
     words += [word for key in (BOARD, *sets) for word in ("--set", key)]
-    fast = ("run", "--fast", "--duration", "2", "--viewer", "none", "--json", "f.json")
+    fast = ("run", "--fast", "--duration", str(seconds), "--viewer", "none", "--json", "f.json")
     ended = run(*fast, *options, *words)
     document: dict[str, Any] = json.loads((folder / "f.json").read_text())
     assert "Traceback" not in ended.err
@@ -130,6 +131,16 @@ def test_device_clock_that_is_off(cli: Run, tmp_path: Path, percent: str, words:
     assert "prescaler" in done.err
     assert "crystal" in done.err
     assert f"{float(percent):+.2f}" in done.out
+
+
+def test_device_clock_that_goes_wrong_for_a_while_is_told(cli: Run, tmp_path: Path) -> None:
+    done, document = fly(cli, tmp_path, "firmware.clock:percent=-2,at=1s,for=2.5s", seconds=8)
+    (warning,) = document["link"]["warnings"]
+    assert (done.code, warning["cause"]) == (0, "device_clock")
+    assert warning["share"] == pytest.approx(-0.02, rel=0.02)
+    assert document["link"]["clock_error"] == pytest.approx(0.0, abs=1e-3)
+    (row,) = [line.split() for line in done.out.splitlines() if line.startswith("device's clock")]
+    assert row[-3:] == ["-2.00", "%", "fast"]
 
 
 def test_device_clock_within_its_crystal_is_no_news(cli: Run, tmp_path: Path) -> None:

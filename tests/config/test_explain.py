@@ -40,7 +40,7 @@ def test_shipped_rigs_have_no_warnings() -> None:
     ("overrides", "words"),
     [
         (["observer.kind=paper"], "super_twisting"),
-        (["observer.mu0_rad_s=0"], "runs away"),
+        (["observer.mu0_rad_s=0", "observer.M_rad_s3=300"], "runs away"),
         (["observer.mu0_rad_s=5"], "far from the rule's 40 rad/s"),
         (["controller.kd_1_s=50"], "will ring"),
         (["reference.soft_start_s=0"], "first command"),

@@ -84,12 +84,11 @@ def test_motor_may_be_weaker_or_stronger_than_the_model(ku: float) -> None:
     assert known(got.tracking_rms_rad) < 0.5 * _MRAD
 
 
-@pytest.mark.parametrize("monitors", ["all", "finite"])
-def test_loop_runs_away_when_the_floor_is_taken_away(monitors: str) -> None:
+def test_loop_runs_away_when_the_floor_is_taken_away() -> None:
     # section 5: with mu0 = 0 it runs away at ku x1.25 (more than 1 rad off, or caught)
     overrides = (f"sim.plant.ku_rad_s2_V={5.4 * 1.25}", "reference.soft_start_s=0.0")
     try:
-        got = figures(*overrides, "observer.mu0_rad_s=0.0", f"supervisor.monitors={monitors}")
+        got = figures(*overrides, "observer.mu0_rad_s=0.0", "supervisor.monitors=finite")
     except TripError:
         pass
     else:

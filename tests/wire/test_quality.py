@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from dcmp_hil.wire.quality import DeviceCounters, LinkCounters, growth, judge
@@ -44,6 +46,21 @@ def causes(**counts: int | float | DeviceCounters) -> list[str]:
 )
 def test_every_cause_has_its_name(counts: dict[str, int], found: list[str]) -> None:
     assert causes(**counts) == found
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        {"samples": 18, "lost": 58, "corrupt": 151},  # noise makes several frames of one
+        {"samples": 2, "lost": 2, "corrupt": 19},
+        {"samples": 20, "missed": 20, "device": DeviceCounters(crc_errors=90)},
+    ],
+)
+def test_no_more_than_everything_is_damaged(counts: dict[str, Any]) -> None:
+    (concern,) = judge(LinkCounters(**counts), HALF_A_PERCENT, HALF_A_PERCENT)
+    assert concern.cause.endswith("_damaged")
+    assert 0.8 < concern.share <= 1.0
+    assert f"{100 * concern.share:.0f} %" in concern.text
 
 
 def test_growth_of_health_is_that_of_the_run_and_says_where_it_is_a_lower_bound() -> None:
