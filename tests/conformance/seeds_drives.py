@@ -146,6 +146,18 @@ def arming_seed(drives: int) -> type[Seed]:
     return Arms
 
 
+class ArmingCountsOn(Seed):
+    counted = 0
+
+    def _obey(self, voltage_mV: int, arm: bool, clear: bool, step: int) -> None:
+        before = self.state
+        super()._obey(voltage_mV, arm, clear, step)
+        if (before, self.state) == (IDLE, ARMING):
+            self._armed = max(self._armed, self.counted)
+        if self.state == ARMING:
+            self.counted = self._armed
+
+
 class ArmingWithGaps(Seed):
     def _obey(self, voltage_mV: int, arm: bool, clear: bool, step: int) -> None:
         super()._obey(voltage_mV, arm, clear, 1)
@@ -201,6 +213,9 @@ SEEDS: dict[str, Row] = {
     "flags may contradict each other": (
         drive_seed(lambda _, v, w, s, t: (v, w & ~4 if w & 7 == 6 else w, s, t)), "can", "drive-refused",
     ),
+    "arm overrules other flags": (
+        drive_seed(lambda _, v, w, s, t: (v, w & ~6 if w & 1 else w, s, t)), "can", "arming-flags",
+    ),
     "the session is not checked": (EverybodyDrives, "can", "drive-refused"),
     "broken rules count as gaps": (DropsCount, "can", "drive-refused"),
     "age is not checked": (drive_seed(_any_age), "can", "drive-age"),
@@ -220,6 +235,7 @@ SEEDS: dict[str, Row] = {
     "release clears a fault": (ReleaseClears, "can", "clear-session"),
     "nine DRIVEs arm": (arming_seed(9), "can", "arming"),
     "five DRIVEs arm": (arming_seed(5), "can", "arming"),
+    "what was counted before counts on": (ArmingCountsOn, "can", "arming"),
     "arming goes on over gaps": (ArmingWithGaps, "can", "arming-broken"),
     "arming with a voltage": (ArmingWithVoltage, "can", "arming-broken"),
     "silence in ARMING is a fault": (ArmingFaults, "can", "arming-silent"),

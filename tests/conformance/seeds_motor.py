@@ -80,6 +80,13 @@ def _without_parameter(device: Any, age: int) -> int:
     return age if device._ttl_ms < 50 else age - 1000 * (20 - min(device._set[wire.WATCHDOG], 20))
 
 
+class MissedCountsNothing(Seed):
+    def tick(self, counts: int) -> None:
+        gaps = self._gaps
+        super().tick(counts)
+        self._gaps = gaps
+
+
 class FedByRefused(Seed):
     def _on_drive(self, content: bytes) -> None:
         self._drive_us = self.now_us
@@ -117,6 +124,7 @@ SEEDS: dict[str, Row] = {
         drive_seed(lambda _, v, w, s, t: (abs(v), w, s, t)), "can", "voltage",
     ),
     "the voltage is not held": (NotHeld, "can", "voltage-held"),
+    "missed periods count as nothing": (MissedCountsNothing, "can", "voltage-held"),
     "limited is never said": (ClampUnsaid, "can", "voltage-limit"),
     "the limit is doubled": (ClampTwice, "can", "voltage-limit"),
     "the slew limit is ignored": (NoSlew, "can", "slew"),

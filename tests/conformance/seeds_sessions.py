@@ -90,6 +90,13 @@ class QuestionsRenew(Seed):
         super()._on_hello(content)
 
 
+class WrongHashRenews(Seed):
+    def _on_hello(self, content: bytes) -> None:
+        if struct.unpack("<HI", content)[0] == self._owner:
+            self._heard_us = self.now_us
+        super()._on_hello(content)
+
+
 class SetsDoNotRenew(Seed):
     def _on_set(self, content: bytes) -> None:
         heard = self._heard_us
@@ -100,6 +107,18 @@ class SetsDoNotRenew(Seed):
 class ParametersStay(Seed):
     def sow(self) -> None:
         self._parameters.restore = lambda: None  # type: ignore[method-assign]
+
+
+class OneParameterStays(Seed):
+    def sow(self) -> None:
+        usual = self._parameters.restore
+
+        def restore() -> None:
+            kept = self._set[wire.SLEW]
+            usual()
+            self._set[wire.SLEW] = kept
+
+        self._parameters.restore = restore  # type: ignore[method-assign]
 
 
 def change_seed(change: Callable[[dict[str, Any]], int | None]) -> type[Seed]:
@@ -188,8 +207,10 @@ SEEDS: dict[str, Row] = {
     "ownership ends after 300 ms": (lease_seed(300_000), "can", "lease"),
     "ownership never ends": (lease_seed(10**12), "can", "lease"),
     "questions of others renew ownership": (QuestionsRenew, "can", "lease"),
+    "a HELLO with another hash renews ownership": (WrongHashRenews, "can", "lease"),
     "PARAMETER_SET does not renew ownership": (SetsDoNotRenew, "can", "lease"),
     "parameters outlast their owner": (ParametersStay, "can", "as-built"),
+    "one parameter outlasts its owner": (OneParameterStays, "can", "as-built"),
     "a parameter is missing": (ParameterMissing, "can", "parameters-read"),
     "an unknown parameter is 0, OK": (UnknownIsZero, "can", "parameters-unknown"),
     "the period can be set": (change_seed(_any_parameter), "can", "parameters-read-only"),

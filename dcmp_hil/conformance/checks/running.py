@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import Check, NotJudgedError
 from dcmp_hil.conformance.checks.arming import LOW_MV, run
+from dcmp_hil.conformance.checks.drives import ROOM
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, Parameter, Result, State
 
@@ -59,8 +60,9 @@ def voltage(client: Client) -> Iterator[str]:
 
 
 def held(client: Client) -> Iterator[str]:
-    """Leave out some DRIVEs: the voltage stays, and SAMPLE says missed."""
+    """Leave out some DRIVEs: the voltage stays, SAMPLE says missed, HEALTH counts each."""
     _no_slew(client)
+    before = client.health().sequence_gaps
     session = client.own()
     run(client, session)
     mark = client.mark()
@@ -74,6 +76,10 @@ def held(client: Client) -> Iterator[str]:
         yield "the voltage is not held in periods without a DRIVE"
     if not all(seen.sample.missed for seen in between):
         yield "SAMPLE says missed = 0 in RUN in periods without a DRIVE"
+    client.drive(session)
+    grown = client.health().sequence_gaps - before
+    if before < ROOM and grown < len(between):
+        yield f"{len(between)} periods in RUN were missed, sequence_gaps grew by {grown}; each counts"
 
 
 def clamp(client: Client) -> Iterator[str]:

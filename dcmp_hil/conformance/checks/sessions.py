@@ -94,6 +94,10 @@ def repeated_hello(client: Client) -> Iterator[str]:
         yield "a DRIVE with the seq of the one before was accepted after the owner's second HELLO"
 
 
+_SETTABLE = (
+    *(Parameter.VOLTAGE_LIMIT_MV, Parameter.SLEW_MV_PER_MS, Parameter.WATCHDOG_MS),
+    *(Parameter.SPEED_LIMIT_COUNTS_S, Parameter.TRAVEL_LIMIT_COUNTS, Parameter.EDGE_STAMPS),
+)
 _SOME = 240  # a counter of HEALTH below this has room
 
 
@@ -141,12 +145,13 @@ def release(client: Client) -> Iterator[str]:
 
 
 def lease(client: Client) -> Iterator[str]:
-    """Fall silent: questions of others renew nothing, and after 500 ms the device is free."""
+    """Fall silent: what is not valid or of others renews nothing, and after 500 ms the device is free."""
     session = client.own()
     client.get(Parameter.TICK)
     asked = client.tick
     client.listen(client.periods(_LEASE_MS - _NEAR_MS))
-    answer = client.hello()  # of session 0: renews nothing
+    client.hello(session, 1)  # another hash, and
+    answer = client.hello()  # session 0: both renew nothing
     if client.tick - asked < client.periods(_LEASE_MS) and answer is not None and not answer.busy:
         yield f"the ownership was over {client.tick - asked} periods after the owner's HELLO, before 500 ms"
     client.listen(client.periods(2 * _NEAR_MS))
@@ -166,12 +171,13 @@ def lease(client: Client) -> Iterator[str]:
 
 
 def as_built(client: Client) -> Iterator[str]:
-    """Change a parameter, give the device back, own it again, as another host and as the same."""
+    """Change every parameter, give the device back, own it again, as another host and as the same."""
     for again in (False, True):
         session = client.own()
-        built = client.value(Parameter.WATCHDOG_MS)
-        other = 17 if built != 17 else 16  # noqa: PLR2004 - any other will do
-        client.put(session, Parameter.WATCHDOG_MS, other)
+        built = {parameter: client.value(parameter) for parameter in _SETTABLE}
+        for parameter in _SETTABLE:
+            other = 17 if built[parameter] != 17 else 16  # noqa: PLR2004 - any other will do
+            client.put(session, parameter, 1 if parameter == Parameter.EDGE_STAMPS else other)
         for _ in range(20):
             client.newest()
             client.drive(session, release=True)
@@ -180,9 +186,10 @@ def as_built(client: Client) -> Iterator[str]:
             if found is not None and not found.busy:
                 break
         client.hello(session if again else client.another_session())
-        if (now := client.value(Parameter.WATCHDOG_MS)) != built:
-            who = "the same session" if again else "another session"
-            yield f"WATCHDOG_MS is {now} when {who} is given the device; it was built with {built}"
+        who = "the same session" if again else "another session"
+        for parameter, value in built.items():
+            if (now := client.value(parameter)) != value:
+                yield f"{parameter.name} is {now} when {who} is given the device; it was built with {value}"
         client.listen(client.periods(_LEASE_MS + 2 * _NEAR_MS))
 
 
