@@ -73,7 +73,9 @@ def _rounded(time: Column, notes: list[str]) -> Column:
         return time
     grid = _fit(time, resolution)
     multiple = grid.period / resolution
-    if grid.spread > 1.05 * resolution + _ROUNDING or abs(multiple - round(multiple)) < _FINE:
+    # Near one step a longer one may be a lost row; near several of them it is the rounding only.
+    unsure = abs(multiple - round(multiple)) < (_FINE if round(multiple) == 1 else _ROUNDING)
+    if grid.spread > 1.1 * resolution + _ROUNDING or unsure:
         return time
     notes.append(_said(grid, f"The stamps are as coarse as {resolution:.4g} s"))
     return grid.number * grid.period

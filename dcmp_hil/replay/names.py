@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.replay.named_units import written_unit
 from dcmp_hil.replay.units import SI, bare, find_unit, known_unit
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _NAMES: dict[Quantity, tuple[str, ...]] = {
         "times",
         "timestamps",
         "zeit",
-        "datetime",
+        *("datetime", "uhrzeit", "zeitstempel"),
     ),
     "position": (
         *("position", "pos", "q", "angle", "theta", "phi", "x", "x1", "y", "joint", "encoder", "winkel"),
@@ -44,6 +45,8 @@ _WHOLE: dict[str, Quantity] = {
     "x value": "time",
     "x values": "time",
     "date time": "time",
+    "datum uhrzeit": "time",
+    "datum zeit": "time",
     "counts": "position",
 }
 _WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
@@ -65,6 +68,17 @@ _DRIVE = _words("drive input amp amplifier")
 _OTHER = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered filt
     limit min max std constant offset index id acceleration accel acc current temperature temp
     bus supply battery dc""")
+_ALL_NAMES = frozenset(word for words in _NAMES.values() for word in words)
+_DESCRIBING = (
+    _PLAIN
+    | _COMMAND
+    | _DRIVE
+    | _OTHER
+    | _ALL_NAMES
+    | frozenset(_NO_UNIT)
+    | _words("""unwrapped
+    wrapped raw since start boot begin measurement relative absolute cw ccw in of the and from""")
+)
 
 
 _WHY = {
@@ -136,7 +150,8 @@ def match(
     Raises
     ------
     ConfigError
-        If an option names a column or a unit that does not exist, or two columns look equally likely.
+        If an option names a column or a unit that does not exist, the name writes a unit that is unknown, or
+        two columns look equally likely.
     """
     name = _likeliest(quantity, header) if column is None else _named(quantity, header, column)
     if name is None:
@@ -144,6 +159,7 @@ def match(
     if unit is not None:
         return Match(quantity, name, *known_unit(quantity, unit), "option")
     words, found = _parts(quantity, name)
+    found = written_unit(quantity, name, _DESCRIBING) or found
     if found is None and len(words) == 1:
         found = find_unit(quantity, words[0])
     if found is not None:
@@ -163,6 +179,11 @@ def match(
 def is_format(told: str) -> bool:
     """Whether what stands for a unit is how a time is written, such as ``hh:mm:ss.SSS``."""
     return re.search(r"[hHmM]{1,2}:[mMsS]{1,2}|[yY]{2}", told) is not None
+
+
+def known_in(fields: Sequence[str]) -> int:
+    """Return how many quantities the names of a line are known as."""
+    return sum(any(_rank(quantity, name) is not None for name in fields) for quantity in _NAMES)
 
 
 def sample_number(header: Sequence[str]) -> str | None:

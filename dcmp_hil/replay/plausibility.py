@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _FASTEST = 2000.0  # rad/s, 19,000 rpm
 _HOPELESS = 3.0  # times the motion itself: no observer that follows it is so far off
 _LARGE = 20.0  # rad/s
+_FIERCE = 5.0  # times the largest accelerations that input and gravity explain
+_GRAVITY = 50.0  # rad/s2, of an arm of 0.2 m
 
 
 def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.bool_]) -> None:
@@ -35,6 +37,37 @@ def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.
             f"({fastest * 60.0 / (2.0 * np.pi):.4g} rpm), which cannot be. Check the units (--position-unit, "
             "--counts-per-rev, --time-unit), the modulus that the position wraps at (--modulus), and "
             "--period if you gave it."
+        )
+
+
+def check_assumed(
+    recording: Recording, reference: ZeroPhase, pushed: NDArray[np.float64], judged: NDArray[np.bool_]
+) -> None:
+    """Refuse a position without a unit that moves far more fiercely than input and gravity explain.
+
+    Parameters
+    ----------
+    recording, reference, judged
+        As for `check_motion`.
+    pushed
+        rad/s2, shape (n,): the acceleration by the input.
+
+    Raises
+    ------
+    ConfigError
+        With the option that says the unit: degrees that are taken as radians look like this.
+    """
+    position = next((column for column in recording.columns if column.quantity == "position"), None)
+    if position is None or position.source != "assumed":
+        return
+    unexplained, explained = (
+        float(np.sqrt(np.mean(np.square(values[judged])))) for values in (reference.disturbance, pushed)
+    )
+    if unexplained > _FIERCE * (explained + _GRAVITY):
+        raise ConfigError(
+            f'{recording.name}: nothing says the unit of the position "{position.column}". In rad its motion '
+            f"would need {unexplained:.3g} rad/s2 that neither input nor gravity explains. Say the unit: "
+            "--position-unit deg, or rad if it is."
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.replay.cells import clock_times, is_clock, numbers
 from dcmp_hil.replay.choice import choose
+from dcmp_hil.replay.inputs import held, undamaged
 from dcmp_hil.replay.recording import ColumnOptions, Recording
 from dcmp_hil.replay.stamps import Stamps, epoch_unit, rising
 from dcmp_hil.replay.table import read_table
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 _TURN = 2.0 * np.pi
 _MOST_SHOWN = 5
 _HALF = 0.5
-_HELD = 0.05  # share of empty cells from which an input was written less often than the position
 _LARGEST = 1e12  # in any unit: beyond it a number is an overflow
 _WHOLE_RADIANS = 50.0  # a span of whole numbers that no recording in rad has
 
@@ -112,14 +112,9 @@ def _numbers(
     applied = None if columns.input is None else _column(table, columns.input)
     velocity = None if columns.velocity is None else _column(table, columns.velocity)
     if columns.input is not None and applied is not None:
-        empty = np.array([not cell for cell in table.column(columns.input.column)])
-        if _HELD * len(empty) < empty.sum() < len(empty):
-            written = len(empty) - int(empty.sum())
-            last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(empty))))
-            applied = applied[last]
-            notes.append(
-                f'"{columns.input.column}" is written in {written} of {len(empty)} rows: held in between.'
-            )
+        name = columns.input.column
+        applied = held(applied, table.column(name), name, notes)
+        applied = undamaged(applied, columns.input.size, name, notes)
     time, size, period = None, 1.0, options.period
     if columns.time is not None:
         time, columns, period = _time(table, columns, options, notes)

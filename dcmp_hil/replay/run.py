@@ -10,7 +10,7 @@ import numpy as np
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
-from dcmp_hil.replay.plausibility import check_estimates, check_motion
+from dcmp_hil.replay.plausibility import check_assumed, check_estimates, check_motion
 from dcmp_hil.replay.preparation import prepare
 from dcmp_hil.replay.reference import ZeroPhase, zero_phase
 from dcmp_hil.replay.settings import ReplaySettings
@@ -99,6 +99,7 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
             "Check --time-unit, record longer, or write a smaller --from."
         )
     check_motion(recording, reference, judged)
+    check_assumed(recording, reference, set_up.setting.model.ku * set_up.voltage, judged)
     estimates = _run(set_up.observer, recording, set_up.voltage, gap)
     check_estimates(recording, estimates, reference, judged)
     return ReplayResult(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.cells import is_clock, is_value, label_in, unit_in
+from dcmp_hil.replay.cells import is_clock, is_value, label_in, number, unit_in
 from dcmp_hil.replay.decoding import read_lines
 from dcmp_hil.replay.layout import (
     BLANK,
@@ -19,6 +20,7 @@ from dcmp_hil.replay.layout import (
     prepared,
     split,
 )
+from dcmp_hil.replay.names import known_in
 from dcmp_hil.replay.units import any_unit
 
 if TYPE_CHECKING:
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
 Line = tuple[int, str]  # its number in the file, from 1, and its text
 
 _SHOWN = 50  # characters of a line in a message
+_RECENT = 500  # rows at the end that a broken number is compared with
+_RARE = 0.01  # share of rows
+_BENT = 2.0  # times the sharpest bend of those rows
 
 
 class Table(NamedTuple):
@@ -108,7 +113,7 @@ def read_table(path: Path) -> Table:
     notes = [*source.notes, *_said(before, left_out, repeated)]
     if joined:
         notes.append("The comma is delimiter and decimal sign: every two fields are one number.")
-    if _torn(rows, source):
+    if _torn(rows, source, layout.decimal):
         rows.pop()
         numbers.pop()
         notes.append("The last line is unfinished and left out.")
@@ -130,6 +135,7 @@ def _said(before: Sequence[Line], left_out: Sequence[Line], repeated: int) -> It
 def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str], list[Line]]:
     """Find the header in the lines above the first row: names, units, and what is neither."""
     units: list[str] = []
+    nearest: tuple[int, list[str]] | None = None
     for place in range(len(above) - 1, -1, -1):
         text = above[place][1]
         for fields in _as_header(text, layout):
@@ -138,8 +144,19 @@ def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str],
                 units = fields
                 break
             if words and sum(is_value(word, layout.decimal) for word in words) < HALF * len(words):
-                return fields, units, [line for line in above[:place] if not COMMENT.match(line[1])]
-    return [], units, [line for line in above if not COMMENT.match(line[1])]
+                if nearest is None and known_in(fields):
+                    return fields, units, _text(above[:place])
+                if nearest is not None and known_in(fields) > 1:  # such as names above those of the sensors
+                    return fields, units, _text(above[:place])
+                nearest = nearest or (place, fields)
+                break
+    # No line has a name that is known: the one above the rows is taken, and options name its columns.
+    place, fields = nearest or (len(above), [])
+    return fields, units, _text(above[:place])
+
+
+def _text(lines: Sequence[Line]) -> list[Line]:
+    return [line for line in lines if not COMMENT.match(line[1])]
 
 
 def _as_header(text: str, layout: Layout) -> Iterator[list[str]]:
@@ -168,27 +185,37 @@ def _rows(
     lines: Sequence[Line], layout: Layout, header: Sequence[str]
 ) -> tuple[list[list[str]], list[int], list[Line], int]:
     rows, numbers, left_out, repeated = [], [], [], 0
-    for number, text in lines:
+    for place, text in lines:
         fields = split(text, layout.delimiter)
         if len(fields) > layout.width and not any(fields[layout.width :]):
             fields = fields[: layout.width]
         if len(fields) == layout.width and holds_numbers(fields, layout) and not COMMENT.match(text):
             rows.append(fields)
-            numbers.append(number)
+            numbers.append(place)
         elif header and any(list(header) == candidate for candidate in _as_header(text, layout)):
             repeated += 1
         elif not COMMENT.match(text):
-            left_out.append((number, text))
+            left_out.append((place, text))
     return rows, numbers, left_out, repeated
 
 
-def _torn(rows: list[list[str]], source: Lines) -> bool:
-    """Whether the last row, which has no line end, breaks off within its last number."""
-    fewest = 3  # rows that the usual number of decimals is told from
+def _torn(rows: list[list[str]], source: Lines, decimal: str) -> bool:
+    """Whether the last row, which has no line end, breaks off within its last number.
+
+    It has fewer decimals than nearly every other, or it is shorter than the one before and leaves the motion.
+    """
+    fewest = 10  # rows that the usual number of decimals and the usual motion are told from
     if source.ended or len(rows) <= fewest or not source.lines[-1].endswith(rows[-1][-1]):
         return False
-    decimals = [len(re.split("[.,]", row[-1])[-1]) if re.search("[.,]", row[-1]) else 0 for row in rows]
-    return decimals[-1] < min(decimals[:-1])
+    cells = [row[-1] for row in rows]
+    decimals = [len(re.split("[.,]", cell)[-1]) if re.search("[.,]", cell) else 0 for cell in cells]
+    rare = sum(shown <= decimals[-1] for shown in decimals[:-1]) < _RARE * len(decimals)
+    if rare:
+        return True
+    values = [number(cell, decimal) for cell in cells[-_RECENT:]]
+    bends = [abs(a - 2.0 * b + c) for a, b, c in zip(values, values[1:], values[2:], strict=False)]
+    known = [bend for bend in bends[:-1] if not math.isnan(bend)]
+    return len(cells[-1]) < len(cells[-2]) and bool(known) and bends[-1] > _BENT * max(known)
 
 
 def _aligned(
@@ -208,7 +235,7 @@ def _aligned(
         units = [*units, ""] if not header[-1] else ["", *units]
     if len(header) > width:
         rows = [row + [""] * (len(header) - width) for row in rows]
-    header = [name.strip().strip("#%").strip() or str(place) for place, name in enumerate(header, 1)]
+    header = [name.strip().lstrip("#%").strip() or str(place) for place, name in enumerate(header, 1)]
     units = (units + [""] * len(header))[: len(header)]
     cells = [unit_in(cell) or "" for cell in first] + [""] * (len(header) - width)
     units = [re.sub(r"[\[\]()]", "", told) or cell for told, cell in zip(units, cells, strict=True)]

@@ -27,6 +27,7 @@ _AROUND = 3  # rows on either side that a step is compared with
 _LONGEST_SPIKE = 3  # rows
 _FEW = 0.02  # share of rows
 _FEWEST = 3
+_SHORTEST = 3  # rows that have a step beside another one
 
 Modulus = float | Literal["none"] | None
 
@@ -123,6 +124,8 @@ def continuous(
                 f"The position wraps at {what} in {_places(places)}: unwrapped. --modulus overrides it."
             )
         _check_half(np.diff(raw)[inside], chosen)
+    if len(raw) < _SHORTEST:
+        return Motion(raw, np.ones(len(raw), dtype=bool), (), tuple(notes))
     keep, jumps = _impossible(size * raw, time, inside)
     if not keep.all():
         count, row = int(np.count_nonzero(~keep)), int(np.flatnonzero(~keep)[0]) + 1

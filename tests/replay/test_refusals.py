@@ -59,7 +59,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         "--modulus",
     ),
     "a unit that is none": (
-        ["time,angle,voltage", "s,gon,V", *(f"{0.002 * k:.3f},{row}" for k, row in enumerate(rising()))],
+        ["time,angle,voltage", "s,inch,V", *(f"{0.002 * k:.3f},{row}" for k, row in enumerate(rising()))],
         {},
         "--position-unit",
     ),
