@@ -101,6 +101,10 @@ class Listener:
             self._fault = message
         return message
 
+    def forget_lateness(self) -> None:
+        """Judge lateness anew, after a pause that was meant."""
+        self._offset_us = None
+
     def _notice_lateness(self) -> None:
         """Count a SAMPLE that was read too late to be answered; a clock that runs off is followed."""
         offset_us = self.clock.now_ns() / 1000 - self.tick * self.period_us

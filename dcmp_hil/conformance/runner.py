@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
+from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.conformance.check import NotJudgedError, Outcome, Verdict
 from dcmp_hil.errors import BackendError, OpenError, SampleTimeoutError
 from dcmp_hil.wire.messages import State
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _TRIES = 5  # of a check during which this host was late
 _LEAVINGS = 5  # DRIVEs that ask for IDLE before STOP does
 _BRIEF_S = 0.02
+_LOOK = 40  # SAMPLEs at the start: whether they are of one device
 _LIVE = (State.ARMING, State.RUN)
 
 
@@ -67,8 +69,16 @@ def run_checks(client: Client, checks: Sequence[Check], *, armed: bool, clear: b
 def _begin(client: Client, *, clear: bool) -> None:
     try:
         client.synchronise()
+        watch = TickWatch()
+        for seen in client.listen(_LOOK):
+            watch.add(seen.sample)
     except SampleTimeoutError as error:
         raise OpenError(str(error)) from error
+    if watch.two_devices:
+        raise OpenError(
+            f"{client.line.name}: two devices send as node {client.node}: their ticks jump forth and back. "
+            "Unplug one."
+        )
     identity = client.hello()
     if identity is not None and identity.busy:
         raise OpenError(f"{client.line.name}: in use by another host. End that first.")

@@ -16,6 +16,7 @@ from dcmp_hil.conformance.listener import StoppedError
 from dcmp_hil.conformance.registry import CHECKS
 from dcmp_hil.conformance.runner import run_checks
 from dcmp_hil.errors import OpenError
+from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import Hello, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tests.conformance.seeded import SEEDS
@@ -27,6 +28,7 @@ from tools.protocol import PAGE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+SAMPLE = 0x040
 BY_NAME = {check.name: check for check in CHECKS}
 
 
@@ -64,6 +66,15 @@ def test_a_seeded_error_is_found_by_its_check(error: str) -> None:
         arm.tick()
     if "watchdog" not in error and "stays after" not in error:
         assert arm.log[-1] == (0, False)
+
+
+@pytest.mark.parametrize("carrier", ["cobs", "slcan"])
+def test_a_counter_of_what_was_sent_is_found_after_other_checks_too(carrier: str) -> None:
+    make = SEEDS["the counter counts what was sent" + (", slcan" if carrier == "slcan" else "")][0]
+    client, _ = on(make(carrier=carrier), carrier)
+    checks = [BY_NAME["tick-parameter"], BY_NAME["counter-goes-on"]]
+    _, outcome = run_checks(client, checks, armed=False, clear=False)
+    assert outcome.verdict == Verdict.FAILED
 
 
 def test_every_check_has_an_error_that_it_finds() -> None:
@@ -106,6 +117,27 @@ def test_a_device_that_is_owned_or_in_fault_is_left_alone(owner: int, state: int
         outcomes = list(run_checks(client, CHECKS, armed=False, clear=True))
         assert all(one.verdict != Verdict.FAILED for one in outcomes)
         assert device.state == 1
+
+
+@pytest.mark.parametrize("apart", [1, 77, 200])
+def test_two_devices_with_one_node_are_no_findings(apart: int) -> None:
+    class Two(Stranger):
+        """A device, and another one on the same bus that says what it says some ticks before."""
+
+        def transmit_frames(self) -> list[tuple[int, bytes]]:
+            frames = super().transmit_frames()
+            other = [pack(_earlier(unpack(frame, 0), apart), 0) for frame in frames if frame[0] == SAMPLE]
+            return [*frames, *other]
+
+    client, arm = on(Two(carrier="can"), "can")
+    with pytest.raises(OpenError, match="two devices send as node 0"):
+        list(run_checks(client, CHECKS, armed=True, clear=False))
+    arm.tick()
+    assert not any(voltage_mV or enable for voltage_mV, enable in arm.log)
+
+
+def _earlier(message: Any, ticks: int) -> Any:
+    return message._replace(tick=(message.tick - ticks) % 256, position_counts=5)
 
 
 def test_an_end_that_is_asked_for_leaves_the_device_off() -> None:

@@ -76,6 +76,7 @@ def counter_goes_on(client: Client) -> Iterator[str]:
     if isinstance(line, SlcanLine):
         line.write(b"C\r")
     clock.sleep_until_ns(began_ns + int(1e9 * _SILENT_S))
+    client.forget_lateness()
     if isinstance(line, SlcanLine):
         line.write(b"O\r")
     client.drain()
