@@ -46,6 +46,7 @@ _STUCK = (
     "Close that viewer and open another."
 )
 _SCARCE = 100e6  # bytes free below which a disk is the likely cause
+_BEGINNING = 400e3  # bytes: scenery and layout are 250 kB
 _NO_WINDOW = (
     "The viewer ended by itself (exit code {code}; process.log in the run's folder has its words). "
     "The run is served on port {port}: dcmp-hil view --port {port} --web"
@@ -83,7 +84,7 @@ class RerunSink:
     Raises
     ------
     ConfigError
-        If the file cannot be created.
+        If the file cannot be created, or there is no room for what stands at its beginning.
     """
 
     def __init__(
@@ -177,6 +178,13 @@ class RerunSink:
                 f"{record}: {error.strerror or error}. Choose a file for the recording that you may write, "
                 "in a folder that exists."
             ) from None
+        room = room_for(record)
+        if room < _BEGINNING:  # Rerun waits for ever where the disk fills up while it begins
+            raise ConfigError(
+                f"{record}: there is room for {1e-3 * room:.0f} kB, and a recording begins with up to "
+                f"{1e-3 * _BEGINNING:.0f} kB. Free some space, or record elsewhere (--record FILE.rrd) or "
+                "not at all (--no-record)."
+            )
         stream = self._stream()
         try:
             _begin(rr.FileSink(record), self._rig, stream)

@@ -165,6 +165,18 @@ def test_unwritable_recording_is_a_config_error_with_a_remedy(tmp_path: Path) ->
         RerunSink(VIEW, tmp_path / "no" / "run.rrd", "none")
 
 
+def test_a_recording_does_not_begin_where_its_beginning_has_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rerun would wait for ever in the main thread, where not even SIGTERM is heard."""
+    begun: list[object] = []
+    monkeypatch.setattr(rerun_sink, "room_for", lambda _: 98_304.0)
+    monkeypatch.setattr(rerun_sink, "_begin", lambda *_: begun.append(1))
+    with pytest.raises(ConfigError, match=r"room for 98 kB.* Free some space.*--no-record"):
+        RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    assert not begun
+
+
 @pytest.mark.usefixtures("_no_display")
 def test_spawn_without_a_display_warns_and_goes_on(tmp_path: Path) -> None:
     sink = RerunSink(VIEW, tmp_path / "run.rrd", "spawn")
