@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _LOOK_AHEAD = 60.0  # s of a csv reference that are looked at where the run has no end
 _LOOKS = 2000
+_ROOM = 1.5  # of what pushes a healthy arm, that its watch needs
 _HELD = 0.95  # of the motor's torque, that holding the arm may take
 
 
@@ -73,11 +74,23 @@ def _beyond(rig: Rig) -> Iterator[str]:
             f"reference: it asks for {asked.acceleration:.4g} rad/s2, more than the motor can follow with "
             f"amplifier.voltage_limit_V; it will be limited to {hardest:.4g} rad/s2."
         )
+    yield from _unexplained(rig, min(asked.position, position))
     motor, pushed = rig.model.ku_rad_s2_V * rig.amplifier.limit, _pushed(rig, min(asked.position, position))
     if not pushed <= _HELD * motor:
         yield (
             f"reference: the arm cannot be held there: gravity and the constant push are up to {pushed:.4g} "
             f"rad/s2, the motor has {motor:.4g} at amplifier.voltage_limit_V."
+        )
+
+
+def _unexplained(rig: Rig, position: float) -> Iterator[str]:
+    """Compare what pushes a healthy arm with what the watch takes for a fault: it knows no gravity."""
+    limit, seen = rig.supervisor.disturbance_limit_rad_s2, _pushed(rig, position) + rig.model.f1_rad_s2
+    if not seen <= limit:
+        yield (
+            f"reference: gravity, friction and the constant push are up to {seen:.4g} rad/s2 there, and the "
+            f"watch ends the run at supervisor.disturbance_limit_rad_s2 = {limit:.4g}. Set that to "
+            f"{_ROOM * seen:.3g}, or stay nearer to hanging."
         )
 
 

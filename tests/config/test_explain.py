@@ -49,6 +49,10 @@ def test_shipped_rigs_have_no_warnings() -> None:
         (["reference.kind=step", "reference.after_rad=7"], "will be held"),
         (["reference.kind=trapezoid", "reference.low_rad=-7"], "will be held"),
         (["reference.kind=chirp", "reference.offset_rad=-6"], "will be held"),
+        (
+            ["model.gravity_rad_s2=60", "model.ku_rad_s2_V=25"],
+            "disturbance_limit_rad_s2 = 50. Set that to 79",
+        ),
         (["observer.mu0_rad_s=121"], "far from the rule's 40 rad/s"),
         (["supervisor.monitors=finite"], "runaway"),
         (["supervisor.start=immediate"], "no ramp"),
