@@ -38,10 +38,8 @@ def test_shipped_rig_runs_at_1_khz_over_the_kernels_own_slcan(tmp_path: Path) ->
     assert (output.voltage_mV, output.enable, output.state, output.owner) == (0, 0, State.IDLE, 0)
     told = json.loads(figures.read_text())
     assert told["ended_by"] == "duration"
-    del told["link"][
-        "skipped"
-    ]  # a device that catches up says two at once: its scheduler's affair, not the link's
-    assert told["link"] == {"lost": 0, "stale": 0, "corrupt": 0}
+    # A device that catches up says two at once: what the host skipped is its scheduler's affair.
+    assert {told["link"][name] for name in ("lost", "stale", "corrupt", "missed")} == {0}
     assert told["troubles"] == []
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 QEMU = "qemu-system-x86_64"
 INSTALL = "apt install --no-install-recommends qemu-system-x86 iproute2"
 CONSOLE = "console.txt"  # in the shared folder: what was printed
-_SECONDS = 300  # wall: nothing may take longer
+_SECONDS = 1200  # wall, on a computer that does much else: nothing may take longer
 _GRACE_S = 5
 _LAST = 2000  # characters of the console that an error shows
 _KEPT = ("PATH", "HOME", "LANG", "XDG_CACHE_HOME", "CC")
