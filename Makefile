@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults mutants firmware bench encoders numbers lock lockcheck clean
+.PHONY: help run test check pytest faults mutants firmware bench encoders walk numbers lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -68,6 +68,9 @@ firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images
 
 numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulated arm leaves its limits
 	@$(BIN)/python -m tools.typed_numbers $(ARGS)
+
+walk: $(DEV) ## every command in every combination of its options and outputs; CI asks every pair of options and every output
+	@DCMP_WALK=all $(BIN)/python -m pytest tests/walk $(ARGS)
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)

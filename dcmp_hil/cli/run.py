@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from dcmp_hil.cli.options import JsonFile, Overrides, RigName
+from dcmp_hil.typed_text import readable
 
 
 class Viewer(StrEnum):
@@ -73,7 +74,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         record=record,
         keep=not no_record,
         json_file=json_file,
-        note=note,
+        note=readable(note),
         faults=tuple(faults or ()),
         control=not no_control,
     )

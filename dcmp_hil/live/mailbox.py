@@ -8,6 +8,7 @@ import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
     import mmap
@@ -112,6 +113,6 @@ class Mailbox:
 
     def tell_end(self, sentence: str) -> None:
         """Say how the run ended."""
-        data = sentence.encode()[: _SLOT_AT - _LAST_AT]
+        data = readable(sentence).encode()[: _SLOT_AT - _LAST_AT]
         self.memory[_LAST_AT : _LAST_AT + len(data)] = data
         self.words[_LAST] = len(data)

@@ -14,6 +14,7 @@ from dcmp_hil.clock import utc_now
 from dcmp_hil.config.named import names_a_class
 from dcmp_hil.host import host_facts
 from dcmp_hil.recording.layout import FORMAT
+from dcmp_hil.typed_text import readable
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def about(rig: Rig, note: str = "", faults: Sequence[str] = (), folder: Path | N
     }
     if folder is not None and names_a_class(rig):
         known["rig_folder"] = os.path.relpath(rig.plugin_folders[0], folder)
-    return known
+    return {name: readable(text) for name, text in known.items()}
 
 
 def rig_json(rig: Rig) -> str:

@@ -50,7 +50,7 @@ def test_run_ends_with_its_exit_code_when_the_bus_goes_off(tmp_path: Path) -> No
         other.send(frame(ERROR | BUS_OFF))
         assert host.wait() == BACKEND
         assert bench.off_after_ms() <= OFF_MS
-    assert "vcan0: bus-off. Check termination" in host.printed()
+    assert "vcan0: bus-off. The device goes to 0 V by itself. Check termination" in host.printed()
     assert "ip link set vcan0 down, then up" in host.printed()
 
 

@@ -1,0 +1,1 @@
+"""Every command with every option, on every kind of output, through the installed script."""
