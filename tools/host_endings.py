@@ -32,26 +32,33 @@ _PART = f'''
 import time
 from pathlib import Path
 
+import dcmp_hil.loop
+
 class Wrong(BaseException):
     """Not even an Exception."""
 
 class _Raises:
     def __init__(self, setting, what="ValueError"):
         self._what = {{"ValueError": ValueError, "Wrong": Wrong}}.get(what)
+        self._says = what
 
     def _look(self, t):
         if t >= {_AT_S}:
             waited = Path("/proc/self/schedstat").read_text().split()[1]
             Path("deed").write_text(f"{{time.monotonic_ns()}} {{waited}}")
-            if self._what is None:
-                return "no voltage"
-            raise self._what("on purpose")
+            if self._what is not None:
+                raise self._what("on purpose")
+            if self._says == "the loop":
+                dcmp_hil.loop.make = None
+                return 0.0
+            return self._says
 
 class Controller(_Raises):
     def update(self, reference, state):
         self._t = getattr(self, "_t", 0.0) + 1e-3
         pull = 4000.0 * (reference.position - state.position) + 130.0 * (reference.velocity - state.velocity)
-        return self._look(self._t) or (pull - state.disturbance) / 5.4
+        said = self._look(self._t)
+        return (pull - state.disturbance) / 5.4 if said is None else said
 
 class Observer(_Raises):
     def __init__(self, setting, what="ValueError"):
@@ -72,21 +79,29 @@ class Way(NamedTuple):
     code: int  # with which it must leave
     number: signal.Signals | None = None  # sent to it
     overrides: tuple[str, ...] = ()  # with which it ends by itself
+    left: tuple[str, str] = ("IDLE", "NONE")  # state and fault of the device, afterwards
 
 
-def _part_of(section: str, kind: str, what: str) -> Way:
-    return Way(1, None, (f"{section}.kind=goes_wrong:{kind}", f'{section}.options={{what = "{what}"}}'))
+_TRIPPED = 4, ("FAULT", "STOPPED")  # what a class of the user's own does wrong is a trip
+_BROKEN = 1, ("IDLE", "NONE")
+
+
+def _part_of(section: str, kind: str, what: str, end: tuple[int, tuple[str, str]]) -> Way:
+    code, left = end
+    overrides = (f"{section}.kind=goes_wrong:{kind}", f'{section}.options={{what = "{what}"}}')
+    return Way(code, None, overrides, left)
 
 
 WAYS = {
     "Ctrl-C": Way(0, signal.SIGINT),
     "SIGTERM": Way(143, signal.SIGTERM),
     "SIGHUP": Way(129, signal.SIGHUP),
-    "controller: Exception": _part_of("controller", "Controller", "ValueError"),
-    "controller: BaseException": _part_of("controller", "Controller", "Wrong"),
-    "observer: Exception": _part_of("observer", "Observer", "ValueError"),
-    "observer: BaseException": _part_of("observer", "Observer", "Wrong"),
-    "the loop itself": _part_of("controller", "Controller", "no voltage"),
+    "controller: Exception": _part_of("controller", "Controller", "ValueError", _TRIPPED),
+    "controller: BaseException": _part_of("controller", "Controller", "Wrong", _BROKEN),
+    "observer: Exception": _part_of("observer", "Observer", "ValueError", _TRIPPED),
+    "observer: BaseException": _part_of("observer", "Observer", "Wrong", _BROKEN),
+    "controller: no voltage": _part_of("controller", "Controller", "no voltage", _TRIPPED),
+    "the loop itself": _part_of("controller", "Controller", "the loop", _BROKEN),
 }
 
 
@@ -119,12 +134,12 @@ class Ending(NamedTuple):
     @property
     def wrong(self) -> list[str]:
         """What is not as it must be."""
-        code = WAYS[self.way].code
+        code, left = WAYS[self.way].code, WAYS[self.way].left
         return [
             *([f"0 V after {1e-3 * self.own_us:.1f} ms"] if self.own_us > OFF_US else []),
             *([f"gone after {self.own_gone_s:.1f} s"] if self.own_gone_s > GONE_S else []),
             *([f"code {self.exit_code}: {self.said}"] if self.exit_code != code else []),
-            *([f"{self.state} with {self.fault}"] if (self.state, self.fault) != ("IDLE", "NONE") else []),
+            *([f"{self.state} with {self.fault}"] if (self.state, self.fault) != left else []),
             *([f"kept only {self.kept}"] if not {"summary.json", "run.rrd"} <= {*self.kept} else []),
         ]
 

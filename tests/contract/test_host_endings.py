@@ -16,7 +16,9 @@ def _compiled() -> None:
 
 
 @pytest.mark.usefixtures("_compiled")
-@pytest.mark.parametrize("way", ["Ctrl-C", "controller: BaseException", "the loop itself"])
+@pytest.mark.parametrize(
+    "way", ["Ctrl-C", "controller: BaseException", "controller: no voltage", "the loop itself"]
+)
 def test_host_that_ends_leaves_zero_volts_and_everything_it_saw(way: str) -> None:
     assert end(way).wrong == []
 
