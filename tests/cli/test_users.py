@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from tests.installed import environment
 if TYPE_CHECKING:
     from pathlib import Path
 
-STRANGER = 12345
+STRANGER = 20_000 + os.getpid() % 40_000  # a folder in /tmp may be left of another one
 AS_STRANGER = ["unshare", "--user", f"--map-user={STRANGER}", f"--map-group={STRANGER}"]
 
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -323,7 +324,8 @@ def test_a_process_that_works_at_its_figures_is_waited_for() -> None:
     pid = apart.pid
     assert pid is not None
     apart.close()
-    os.waitpid(pid, 0)  # its sink is still at work
+    with suppress(ChildProcessError):  # it has ended and was waited for, or its sink is still at work
+        os.waitpid(pid, 0)
     assert len(apart.figures.columns()["time_s"]) == 100
     assert not told
 
@@ -339,6 +341,7 @@ def test_a_python_that_is_not_there_is_told_of_and_the_run_goes_on(monkeypatch: 
 
 _RUNS_ON = """
 import sys
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from dcmp_hil import load_rig, run
