@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 RUN, DEV = LOCKS = ("requirements.txt", "requirements-dev.txt")
 PIPS = {"22.3": DEV, "23.2": RUN, "24.0": RUN, "newest": DEV}  # each with the lock that it installs
+if sys.version_info >= (3, 12):
+    del PIPS["22.3"]  # it imports what Python 3.12 no longer has
 OLD = "INSTALL=$(PIP) install --require-hashes --only-binary :all: -r"  # what a newer coverage broke once
 
 
