@@ -18,7 +18,7 @@ from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from sim_backend.board.virtual_device import VirtualDevice
 from tools.cable import Cable
-from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, pressed_us, start_host, wait
+from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
 
 if TYPE_CHECKING:
     import subprocess
@@ -78,11 +78,8 @@ def die(way: str) -> Death:
             host = start_host(cable.port if cable else device.port, "--duration", "0", "--no-record")
             try:
                 if is_driven(device, host):
-                    before_us = pressed_us()
                     death = _part(device, host, way, cable)
-                    # Late while its computer ran something else: asked again on a computer that is free.
-                    late = death.silent_us > OFF_US and pressed_us() > before_us
-                    if death.doubt_us <= MOST_DOUBT_US and not late:
+                    if death.doubt_us <= MOST_DOUBT_US:
                         return death._replace(tries=tries)
             finally:
                 host.kill()

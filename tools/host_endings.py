@@ -18,7 +18,7 @@ from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
-from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, pressed_us, start_host, wait
+from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
 
 if TYPE_CHECKING:
     import subprocess
@@ -182,7 +182,7 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
     wait(lambda: not device.output.enable, "the amplifier is off")
     if not deed.exists():
         return None
-    waited_ns, before_us = _waited_ns(host), pressed_us()
+    waited_ns, pressed_us = _waited_ns(host), _pressed_us()
     at_ns, before_ns = map(int, deed.read_text().split())
     deed_us, doubt_us = device.clock_us(at_ns)
     off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
@@ -201,9 +201,18 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
         said=said[-1] if said else "",
         doubt_us=doubt_us,
         waited_us=(waited_ns - before_ns) // 1000,
-        pressed_s=1e-6 * (pressed_us() - before_us),
+        pressed_s=1e-6 * (_pressed_us() - pressed_us),
         tries=1,
     )
+
+
+def _pressed_us() -> int:
+    """Return how long somebody here was ready to run and was not let, in all; 0 where nobody counts."""
+    try:
+        text = Path("/proc/pressure/cpu").read_text("utf-8")
+    except OSError:
+        return 0
+    return int(text.split("total=")[1].split()[0])
 
 
 def _waited_ns(host: subprocess.Popen[bytes]) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil.clock import MonotonicClock, pause
@@ -12,6 +11,7 @@ from dcmp_hil.wire.messages import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from sim_backend.board.virtual_device import VirtualDevice
 
@@ -67,12 +67,3 @@ def wait(holds: Callable[[], bool], what: str) -> None:
         if clock.now_ns() > until_ns:
             raise TimeoutError(f"waited {BOUND_S:g} s until {what}")
         pause(_LOOK_S)
-
-
-def pressed_us() -> int:
-    """Return how long somebody here was ready to run and was not let, in all; 0 where nobody counts."""
-    try:
-        text = Path("/proc/pressure/cpu").read_text("utf-8")
-    except OSError:
-        return 0
-    return int(text.split("total=")[1].split()[0])
