@@ -15,6 +15,7 @@ _FLAVOURS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the 
 _GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
 _MODEL = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
 _THROTTLE = "/proc/sys/kernel/sched_rt_runtime_us"
+_LOADAVG = "/proc/loadavg"
 _LINUX_MODULES = ("fcntl", "resource", "termios")
 
 
@@ -67,6 +68,29 @@ def host_facts() -> dict[str, Any]:
 def in_words(facts: dict[str, Any]) -> str:
     """Return the facts as one line."""
     return ", ".join(f"{name} {'unknown' if fact is None else fact}" for name, fact in facts.items())
+
+
+def contention(loadavg: str = _LOADAVG, cpus: int | None = None) -> str:
+    """Say how many threads want the processors now, where they are more than there are processors.
+
+    Parameters
+    ----------
+    loadavg
+        The path of what proc(5) calls /proc/loadavg.
+    cpus
+        Processors that this process may use; None asks the system.
+
+    Returns
+    -------
+    str
+        A clause; empty where there is no contention, or the system does not tell.
+    """
+    fields = (read_fact(loadavg) or "").split()
+    running = fields[3].partition("/")[0] if len(fields) > 3 else ""  # noqa: PLR2004 - "0.2 0.1 0.1 3/411 9123"
+    threads, available = (int(running) if running.isdecimal() else 0), cpus or _cpus()
+    if available is None or threads <= available:
+        return ""
+    return f"{threads} threads want its {available} processors"
 
 
 def privileges() -> dict[str, Any]:

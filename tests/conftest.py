@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.core_library import compiler
 from tests.installed import Finished, environment, install
 from tests.sampling import MARKER, chosen
 from tools import screenshot
@@ -61,6 +62,12 @@ def untraced() -> Iterator[None]:
     sys.settrace(None)
     yield
     sys.settrace(tracer)
+
+
+@pytest.fixture(scope="session")
+def needs_compiler() -> None:
+    """Skip where there is no C compiler; fail where nothing may be missing."""
+    compiler()
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.backends.caller import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
+from dcmp_hil.host import contention
 from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
@@ -186,6 +187,12 @@ def no_sample(name: str, seconds: float, damaged: int, stale: int) -> SampleTime
         return SampleTimeoutError(
             f"{said} that is new: {stale} came, with ticks that were there before. {zero} The device's clock "
             "stands still, or two devices have one node; look at `dcmp-hil monitor`."
+        )
+    if busy := contention():
+        return SampleTimeoutError(
+            f"{said}, and this computer is busy: {busy}. {zero} End other programs, or give the run "
+            "real-time priority (docs/cli.md), then start again. If it comes back, check cable and "
+            "power of the device."
         )
     return SampleTimeoutError(f"{said}. {zero} Check cable and power of the device, then start again.")
 

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _LONGEST = 60  # characters of an override that are shown
+_OVERRIDES_MAX = 200
+_CHARACTERS_MAX = 8192  # of one override; a path has 4096 at most
+_DEPTH_MAX = 8  # parts of a dotted key; a rig's longest has 2, a class of the user's own may have tables
 
 
 def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]:
@@ -33,21 +36,9 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]
     Raises
     ------
     ConfigError
-        With every override that is no `key=value`, or reaches into a value.
+        With every override that is no `key=value`, is too long, or reaches into a value.
     """
-    faults: list[str] = []
-    pairs: dict[tuple[str, ...], Any] = {}
-    for override in overrides:
-        key, equals, text = override.partition("=")
-        parts = tuple(part.strip() for part in key.split("."))
-        if equals and all(parts):
-            pairs.pop(parts, None)
-            pairs[parts] = parse_value(text)
-        else:
-            faults.append(
-                f"--set {printable(override)[:_LONGEST]}: expected KEY=VALUE, such as loop.rate_hz=500 "
-                'or reference.kind="hold".'
-            )
+    pairs, faults = _parsed(overrides)
     for (name, *rest), kind in pairs.items():
         if rest == ["kind"]:
             _drop_keys_of_old_kind(table, name, kind)
@@ -57,6 +48,31 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]
     if faults:
         raise ConfigError(*faults)
     return made
+
+
+def _parsed(overrides: Sequence[str]) -> tuple[dict[tuple[str, ...], Any], list[str]]:
+    """Return keys with values, and a sentence for each override that is none; work and text are bounded."""
+    if len(overrides) > _OVERRIDES_MAX:
+        return {}, [f"--set: {len(overrides)} at once; at most {_OVERRIDES_MAX}. Write them into a rig file."]
+    faults: list[str] = []
+    pairs: dict[tuple[str, ...], Any] = {}
+    for override in overrides:
+        key, equals, text = override.partition("=")
+        shown = printable(override[:_LONGEST])[:_LONGEST]
+        parts = tuple(part.strip() for part in key.split(".", _DEPTH_MAX))
+        if len(override) > _CHARACTERS_MAX or len(parts) > _DEPTH_MAX:
+            faults.append(
+                f"--set {shown}...: too long; at most {_CHARACTERS_MAX} characters, and {_DEPTH_MAX} parts "
+                "of a key. Write it into the rig file."
+            )
+        elif equals and all(parts):
+            pairs.pop(parts, None)
+            pairs[parts] = parse_value(text)
+        else:
+            faults.append(
+                f'--set {shown}: expected KEY=VALUE, such as loop.rate_hz=500 or reference.kind="hold".'
+            )
+    return pairs, faults
 
 
 def _put(table: dict[str, Any], parts: tuple[str, ...], value: Any, made: set[str]) -> list[str]:

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from dcmp_hil.errors import OpenError
-from dcmp_hil.user_folder import private, temporary
+from sim_backend.board import build_cache
 
 _HERE = Path(__file__).parents[1]
 _PLACES = (_HERE / "firmware", _HERE.parent / "firmware")  # in the wheel; in a checkout
@@ -63,10 +63,9 @@ def _built(board: str, name: str, flags: tuple[str, ...]) -> Path:
     key = hashlib.sha256(repr((compiler, _version(compiler), _FLAGS, flags)).encode())
     for file in files:
         key.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    target = _cache() / key.hexdigest()[:16] / name
-    if not target.exists():
-        _compile([*compiler, *_FLAGS, *flags, f"-I{root / 'core'}"], files, target)
-    return target
+    with build_cache.folder(key.hexdigest()[:16]) as folder:
+        found = build_cache.find(folder, name)
+        return found or _compile([*compiler, *_FLAGS, *flags, f"-I{root / 'core'}"], files, folder, name)
 
 
 def _compiler() -> list[str]:
@@ -86,45 +85,13 @@ def _version(compiler: list[str]) -> str:
     return _run([*compiler, "--version"])
 
 
-def _cache() -> Path:
-    """Return the folder of what was compiled; for a user without a home one beside those of others.
-
-    Raises
-    ------
-    OpenError
-        If there is none that is this user's alone.
-    """
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    if base:
-        return Path(base) / "dcmp-hil"
-    try:
-        return Path.home() / ".cache" / "dcmp-hil"
-    except RuntimeError:  # an id without an entry in the table of users, such as a container's
-        pass
-    try:
-        return private(temporary())
-    except OSError as error:
-        raise _unwritable(Path(error.filename or "TMPDIR"), error) from None
-
-
-def _unwritable(folder: Path, error: OSError) -> OpenError:
-    return OpenError(
-        f"{folder}: {error.strerror or error}. The virtual device is compiled there; point "
-        "XDG_CACHE_HOME at a folder you may write in."
-    )
-
-
-def _compile(command: list[str], files: list[Path], target: Path) -> None:
-    """Compile beside the target and rename: two processes at once do no harm."""
+def _compile(command: list[str], files: list[Path], folder: Path, name: str) -> Path:
+    """Compile beside the kept file and rename: two processes at once do no harm."""
     inputs = [str(file) for file in files if file.suffix == ".c"]
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-            made = Path(folder) / target.name
-            _run([*command, "-o", str(made), *inputs])
-            made.replace(target)
-    except OSError as error:
-        raise _unwritable(target.parent, error) from error
+    with tempfile.TemporaryDirectory(dir=folder) as beside:
+        made = Path(beside) / name
+        _run([*command, "-o", str(made), *inputs])
+        return build_cache.keep(made, folder)
 
 
 def _run(command: list[str]) -> str:
