@@ -98,13 +98,15 @@ static void write_all(int port, const uint8_t *bytes, size_t length)
     }
 }
 
-/* Keep the output; returns whether it is another one. */
-static bool take_output(struct board *board, struct dcmp_output output)
+/* Keep the output that the core decided on at `decided_us`; returns whether it is another one. Its instant is the
+ * core's: a process that waits for its processor between decision and stamp would show the computer's lateness as the
+ * watchdog's. */
+static bool take_output(struct board *board, struct dcmp_output output, uint32_t decided_us)
 {
     const bool changed = output.voltage_mV != board->output.voltage_mV || output.enable != board->output.enable;
     board->output = output;
     if (changed) {
-        board->since_us = now_us(board);
+        board->since_us = decided_us;
     }
     return changed;
 }
@@ -212,7 +214,8 @@ static void serve_link(struct board *board)
 
 static void look_at_output(struct board *board)
 {
-    if (take_output(board, dcmp_device_output(&board->device, now_us(board)))) {
+    const uint32_t now = now_us(board);
+    if (take_output(board, dcmp_device_output(&board->device, now), now)) {
         tell_plant(board, true);
     }
 }
@@ -237,7 +240,8 @@ static void wait_for_host(struct board *board, uint16_t wait_ms)
         }
         wall = wall_us();
     }
-    (void)take_output(board, dcmp_device_output(&board->device, now_us(board)));
+    const uint32_t now = now_us(board);
+    (void)take_output(board, dcmp_device_output(&board->device, now), now);
 }
 
 /* False at the end of the stream. */
@@ -254,7 +258,7 @@ static bool serve_plant(struct board *board)
     board->tick_at_us = wall_us();
     board->answered = false;
     look_for_host(board);
-    (void)take_output(board, dcmp_device_tick(&board->device, tick.now_us, tick.counts, NULL));
+    (void)take_output(board, dcmp_device_tick(&board->device, tick.now_us, tick.counts, NULL), tick.now_us);
     send_all(board);
     if (tick.wait_ms > 0u) {
         wait_for_host(board, tick.wait_ms);
