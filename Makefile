@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check pytest faults mutants firmware bench encoders walk numbers lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults mutants firmware bench encoders walk numbers lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -45,6 +45,18 @@ check: $(DEV) ## style, format, types, import contracts
 	@$(BIN)/mypy
 	@echo "Checking import contracts ..."
 	@$(BIN)/lint-imports --no-logo
+
+quick: check ## what a commit needs: every check, and the tests that are not slow
+	@$(PYTEST) -q -m "not slow" $(ARGS)
+
+format: $(DEV) ## bring the code into its format, and mend what ruff can mend
+	@$(BIN)/ruff check --fix
+	@$(BIN)/ruff format
+
+generate: $(DEV) ## write again what is made from the DBC and from the rig's tables
+	@$(BIN)/python -m tools.protocol
+	@$(BIN)/python -m tools.schema
+	@$(BIN)/python -m tools.traces
 
 pytest: $(DEV) ## every test, without checks or coverage
 	@$(PYTEST) $(ARGS)

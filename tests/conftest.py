@@ -15,6 +15,10 @@ from tools import screenshot
 
 FIGURE = "figure"
 _LONG = ("tests/stateful/", "tests/socketcan/", "tests/target/", "tests/firmware/test_")  # minutes, alone
+_SLOW = (
+    *_LONG,
+    *(f"tests/{name}/" for name in ("attacks", "conformance", "faults", "install", "panel", "walk")),
+)
 
 # Between the look for a free port and its use another worker could take it.
 screenshot.FIRST_PORT += 100 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
@@ -32,6 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--sample-of", default="", metavar="TEXT", help="what draws them, such as a commit")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m selects by markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest: begun last, it would leave the other workers without work."""
     one_in, text = config.getoption("--sample"), config.getoption("--sample-of")
@@ -42,6 +47,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = {name for names in cases.values() for name in names if name not in chosen(names, one_in, text)}
     config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left_out])
     items[:] = [item for item in items if item.nodeid not in left_out]
+    for item in items:
+        if item.nodeid.startswith(_SLOW):
+            item.add_marker("slow")
     items.sort(key=lambda item: not item.nodeid.startswith(_LONG))
 
 
