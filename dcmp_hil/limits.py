@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import TripError
 from dcmp_hil.governor import Bounds, Governor
-from dcmp_hil.values import Event, Reference
+from dcmp_hil.values import Event, EventKind, LimitData, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -132,22 +132,25 @@ class Limits:
     def _say_governed(self, t: float, reference: Reference) -> None:
         x, v, a = reference
         if not abs(x) <= self._x:
-            self._say(t, f"reference limited to {self._x:.4g} rad: it asks for {x:.4g}")
+            self._say(t, "reference", f"reference limited to {self._x:.4g} rad: it asks for {x:.4g}")
         elif not abs(v) <= self._v:
-            self._say(t, f"reference's velocity limited to {self._v:.4g} rad/s: it asks for {v:.4g}")
+            said = f"reference's velocity limited to {self._v:.4g} rad/s: it asks for {v:.4g}"
+            self._say(t, "velocity", said)
         elif not abs(a) <= self._a:
-            self._say(t, f"reference's acceleration limited to {self._a:.4g} rad/s2: it asks for {a:.4g}")
+            said = f"reference's acceleration limited to {self._a:.4g} rad/s2: it asks for {a:.4g}"
+            self._say(t, "acceleration", said)
         else:
-            self._say(t, f"reference's way limited: the arm is led to {x:.4g} rad as the limits allow")
+            said = f"reference's way limited: the arm is led to {x:.4g} rad as the limits allow"
+            self._say(t, "way", said)
 
     def _limited_voltage(self, t: float, demand: float, last: float) -> float:
         most = self.voltage_limit
         voltage = max(-most, min(most, demand))
         if voltage != demand:
-            self._say(t, f"voltage limited: {demand:.1f} V asked for, {most:.1f} V allowed")
+            self._say(t, "voltage", f"voltage limited: {demand:.1f} V asked for, {most:.1f} V allowed")
         slewed = self.slewed(voltage, last) if self._slews else voltage
         if slewed != voltage:
-            self._say(t, f"slew limited: {voltage:.1f} V asked for after {last:.1f} V")
+            self._say(t, "slew", f"slew limited: {voltage:.1f} V asked for after {last:.1f} V")
         if slewed != demand:
             self._note_clamp(t, demand)
         return slewed
@@ -163,8 +166,7 @@ class Limits:
                 "amplifier.slew_V_s if the amplifier has more.",
             )
 
-    def _say(self, t: float, sentence: str) -> None:
-        which = sentence.partition(" limited")[0]
-        if not t - self._said.get(which, -math.inf) < _SAID_EVERY:
-            self._said[which] = t
-            self._notify(Event(t, "WARN", sentence))
+    def _say(self, t: float, limit: str, sentence: str) -> None:
+        if not t - self._said.get(limit, -math.inf) < _SAID_EVERY:
+            self._said[limit] = t
+            self._notify(Event(t, "WARN", EventKind.LIMIT, sentence, LimitData(limit)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from dcmp_hil.diagnosis import moved_by
 from dcmp_hil.errors import TripError
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind, ProbeData
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,11 +64,11 @@ class MotorGain(NamedTuple):
             f"probe: motor gain {self.gain:.3g} +- {self.deviation:.2g} (rad/s2)/V, "
             f"{self.ratio:.2f} times [model]'s {self.believed:g}"
         )
+        data = ProbeData(self.gain, self.deviation, self.ratio)
         if not off:
-            return Event(t, "INFO", said)
-        return Event(
-            t, "WARN", f"{said}. Look at model.ku_rad_s2_V, motor supply, gear and encoder.counts_per_rev."
-        )
+            return Event(t, "INFO", EventKind.PROBE, said, data)
+        remedy = "Look at model.ku_rad_s2_V, motor supply, gear and encoder.counts_per_rev."
+        return Event(t, "WARN", EventKind.PROBE, f"{said}. {remedy}", data)
 
 
 class Probe:

@@ -23,7 +23,7 @@ from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.makers import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.trajectory import LOWERING
-from dcmp_hil.values import Event
+from dcmp_hil.values import CauseData, Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.live import Control
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.values import EventData, Level
 
 
 _AT_ZERO: tuple[Literal["INFO", "ERROR"], str] = ("INFO", "amplifier at 0 V")
@@ -146,11 +147,11 @@ class Session:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
             end, why = _end_after(seen), f"{trip} "
-            recorder.event(Event(recorder.t, "ERROR", f"tripped ({trip.reason}): {trip}"))
+            self._tell("ERROR", EventKind.TRIP, f"tripped ({trip.reason}): {trip}", CauseData(trip.reason))
             raise trip from seen.__cause__
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
-                recorder.event(Event(recorder.t, "ERROR", f"deadline: {error}"))
+                self._tell("ERROR", EventKind.DEADLINE, f"deadline: {error}", CauseData("deadline"))
             end, why = _end_after(error), f"{error} "
             raise
         except BaseException as error:
@@ -164,7 +165,7 @@ class Session:
             recorder.link.finish(recorder.t)
             if not why:
                 self._tell_how_device_ended()
-            recorder.event(Event(recorder.t, *end))
+            self._tell(end[0], EventKind.END, end[1])
             recorder.close()
             if self._apart:
                 self._figures = self._apart.figures
@@ -188,14 +189,18 @@ class Session:
         line, recorder = self._line, self._recorder
         device = getattr(line.backend, "described", "")
         if device:
-            recorder.event(Event(0.0, "INFO", f"device: {device}"))
+            recorder.event(Event(0.0, "INFO", EventKind.DEVICE, f"device: {device}"))
         for remark in getattr(line.backend, "remarks", ()):
-            recorder.event(Event(0.0, "WARN", remark))
+            recorder.event(Event(0.0, "WARN", EventKind.DEVICE, remark))
         t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
         if self.rig.run.end == "lower" and not self.stop.requested:
-            recorder.event(Event(t, "INFO", "lowering the arm"))
+            recorder.event(Event(t, "INFO", EventKind.LOWERING, "lowering the arm"))
             line.trajectory.lower(t + line.delay)
             loop.run(line, t + line.delay + LOWERING, self.stop)
+
+    def _tell(self, level: Level, kind: EventKind, text: str, data: EventData | None = None) -> None:
+        """Tell of something at the device time of the last period."""
+        self._recorder.event(Event(self._recorder.t, level, kind, text, data))
 
     def _tell_how_device_ended(self) -> None:
         """Warn where the device stopped by a fault of its own at the end, and not because it was told to."""
@@ -205,14 +210,14 @@ class Session:
                 f"the device ended the run by itself, in fault {ended.fault}: the last commands, 0 V and "
                 "disarm, did not reach it. Check the way from host to device."
             )
-            self._recorder.event(Event(self._recorder.t, "WARN", sentence))
+            self._tell("WARN", EventKind.DEVICE_END, sentence)
 
     def _say_where(self) -> None:
         """Tell of the computer, and of what it did not grant."""
-        self._recorder.event(Event(0.0, "INFO", in_words(self._host)))
+        self._recorder.event(Event(0.0, "INFO", EventKind.HOST, in_words(self._host)))
         for grant in self._realtime.grants if self._realtime else ():
             said = "granted" if grant.granted else grant.refusal
-            self._recorder.event(Event(0.0, "INFO", f"{grant.what}: {said}"))
+            self._recorder.event(Event(0.0, "INFO", EventKind.GRANT, f"{grant.what}: {said}"))
 
     @property
     def began(self) -> bool:

@@ -7,7 +7,7 @@ from enum import Enum, StrEnum, auto
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import DcmpError, TripError
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -215,7 +215,7 @@ class Supervisor:
             self.trip = self._cause
             if cue is Cue.STOPPED and isinstance(self._cause, TripError):
                 self._cause.orderly = True
-        self._notify(Event(t, "PHASE", following.value))
+        self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
 
 
 def _check_finite(sample: Sample, demand: float) -> None:

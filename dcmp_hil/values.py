@@ -1,7 +1,8 @@
 """The one vocabulary: what travels between the stages of a period, a unit on every line."""
 
 import math
-from enum import IntEnum
+from collections.abc import Mapping
+from enum import IntEnum, StrEnum
 from typing import Literal, NamedTuple
 
 
@@ -75,12 +76,91 @@ class Cycle(NamedTuple):
     timing: Timing
 
 
+class EventKind(StrEnum):
+    """What an event tells. Programs read kind and data; the text is for people, and no program reads it."""
+
+    HOST = "host"  # the computer
+    GRANT = "grant"  # what the operating system granted, or refused
+    DEVICE = "device"  # which device answered, and what it remarked
+    PHASE = "phase"
+    PROBE = "probe"  # what the probe found of the motor
+    LIMIT = "limit"  # a limit acts
+    LINK = "link"  # counters, once a second
+    LINK_CONCERN = "link_concern"  # what the counters mean, each cause once
+    CHANGE = "change"  # made while the run went on
+    CONTROL = "control"  # a change that failed, or live changes that are not possible any more
+    TELEMETRY = "telemetry"  # what of telemetry the run goes on without
+    LOWERING = "lowering"  # the way down begins with the next period
+    TRIP = "trip"
+    DEADLINE = "deadline"
+    DEVICE_END = "device_end"  # the device ended the run by a fault of its own
+    END = "end"  # where the amplifier is after the run
+    OTHER = "other"  # read from a recording of another version
+
+
+class PhaseData(NamedTuple):
+    """Of PHASE."""
+
+    phase: str  # a value of `dcmp_hil.supervisor.Phase`
+
+
+class ProbeData(NamedTuple):
+    """Of PROBE."""
+
+    gain_rad_s2_V: float
+    deviation_rad_s2_V: float
+    ratio: float  # measured over believed
+
+
+class LimitData(NamedTuple):
+    """Of LIMIT."""
+
+    limit: str  # reference, velocity, acceleration, way, voltage or slew
+
+
+class LinkData(NamedTuple):
+    """Of LINK."""
+
+    counters: Mapping[str, int]  # by the names of `dcmp_hil.telemetry.link`; without what was not told
+
+
+class ChangeData(NamedTuple):
+    """Of CHANGE."""
+
+    values: Mapping[str, float | str]  # new values by dotted key, to the bit
+
+
+class CauseData(NamedTuple):
+    """Of TRIP, DEADLINE and LINK_CONCERN."""
+
+    cause: str  # a word that stays the same from release to release
+
+
+EventData = PhaseData | ProbeData | LimitData | LinkData | ChangeData | CauseData
+
+DATA: Mapping[EventKind, type[EventData]] = {
+    EventKind.PHASE: PhaseData,
+    EventKind.PROBE: ProbeData,
+    EventKind.LIMIT: LimitData,
+    EventKind.LINK: LinkData,
+    EventKind.LINK_CONCERN: CauseData,
+    EventKind.CHANGE: ChangeData,
+    EventKind.TRIP: CauseData,
+    EventKind.DEADLINE: CauseData,
+}
+"""What the data of each kind are; events of every other kind have none."""
+
+Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]
+
+
 class Event(NamedTuple):
     """Something worth a line of text."""
 
     t: float  # s, device time
-    level: Literal["INFO", "WARN", "ERROR", "PHASE", "LINK"]  # PHASE, LINK: the text is a phase, counters
+    level: Level
+    kind: EventKind
     text: str
+    data: EventData | None = None  # as DATA says
 
 
 UNKNOWN_TRUTH = Truth(math.nan, math.nan, math.nan)

@@ -87,7 +87,7 @@ def _check(trip: TripError, held: HeldRun, stage: str) -> None:
     assert "\n" not in str(trip)
     assert len(str(trip)) < 400
     result = held.session.result()
-    assert [event.text for event in result.events if event.level == "PHASE"][-1] == "tripped"
+    assert [event.text for event in result.events if event.kind == "phase"][-1] == "tripped"
     assert len([event for event in result.events if event.level == "ERROR"]) == 1
 
 

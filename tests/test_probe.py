@@ -8,7 +8,7 @@ import pytest
 
 from dcmp_hil.errors import TripError
 from dcmp_hil.probe import Probe
-from dcmp_hil.values import Event, Sample
+from dcmp_hil.values import Event, ProbeData, Sample
 
 T = 1e-3
 KU = 5.4
@@ -98,8 +98,8 @@ def test_probe_tells_the_motor_gain_and_warns_where_the_model_is_off(gain: float
     probe(gain, count=math.tau / 4096, told=told)
     (event,) = told
     assert event.level == level
-    ratio = float(event.text.partition(" times [model]")[0].rpartition(" ")[2])
-    assert ratio == pytest.approx(gain, rel=0.08)
+    assert isinstance(event.data, ProbeData)
+    assert event.data.ratio == pytest.approx(gain, rel=0.08)
 
 
 @pytest.mark.parametrize("gain", [0.6, 1.0, 1.85])
@@ -107,8 +107,9 @@ def test_probe_tells_the_motor_gain_and_warns_where_the_model_is_off(gain: float
 def test_probe_judges_by_the_voltage_that_a_slow_amplifier_really_puts_out(gain: float, slew: float) -> None:
     told: list[Event] = []
     farthest, _ = probe(gain, count=math.tau / 4096, slew=slew, told=told)
-    ratio = float(told[0].text.partition(" times [model]")[0].rpartition(" ")[2])
-    assert ratio == pytest.approx(gain, rel=0.15)
+    (event,) = told
+    assert isinstance(event.data, ProbeData)
+    assert event.data.ratio == pytest.approx(gain, rel=0.15)
     assert farthest <= 0.12
     with pytest.raises(TripError) as caught:
         probe(-gain, count=math.tau / 4096, slew=slew)

@@ -151,7 +151,7 @@ def test_run_settles_then_engages_then_runs() -> None:
     # 0.25 s each (safety.md, "Start of a run"): 0 V, then a growing limit, then all of it
     rig = bench("supervisor.probe=off", "sim.position_rad=0.02", "sim.plant.eta_rad_s2=0.5")
     result = run(rig, duration=4.0, fast=True)
-    phases = [(event.t, event.text) for event in result.events if event.level == "PHASE"]
+    phases = [(event.t, event.text) for event in result.events if event.kind == "phase"]
     assert [text for _, text in phases] == ["settling", "engaging", "running"]
     assert [t for t, _ in phases] == pytest.approx([0.0, 0.25, 0.5], abs=1e-9)
     t, sent = result.columns["time_s"], result.columns["voltage_sent_V"]
@@ -164,7 +164,7 @@ def test_run_settles_then_engages_then_runs() -> None:
 def test_run_probes_before_it_settles() -> None:
     # 0.1 s at 0 V, +1 V and -1 V for at most 0.1 s each (safety.md, "Start of a run")
     result = run(bench(), duration=2.0, fast=True)
-    phases = [(event.t, event.text) for event in result.events if event.level == "PHASE"]
+    phases = [(event.t, event.text) for event in result.events if event.kind == "phase"]
     assert [text for _, text in phases] == ["probing", "settling", "engaging", "running"]
     assert [t for t, _ in phases] == pytest.approx([0.0, 0.3, 0.55, 0.8], abs=3e-3)
     t, sent = result.columns["time_s"], result.columns["voltage_sent_V"]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dcmp_hil.errors import TripError
 from dcmp_hil.limits import Limits
 from dcmp_hil.supervisor import Phase, Supervisor
-from dcmp_hil.values import Estimate, Event, Reference, Sample
+from dcmp_hil.values import Estimate, Event, EventKind, Reference, Sample
 
 _AT_REST = Estimate(0.0, 0.0, 0.0)
 _PERIOD = 1.0 / 1024.0  # s, exact in binary: phases change at the very period
@@ -64,7 +64,7 @@ def test_supervisor_goes_through_its_phases_in_order() -> None:
         else:
             assert voltage == 10.0
     assert begun == [256]
-    phases = [(event.t, event.text) for event in events if event.level == "PHASE"]
+    phases = [(event.t, event.text) for event in events if event.kind is EventKind.PHASE]
     assert phases == [(5.0, "settling"), (5.25, "engaging"), (5.5, "running")]
     assert supervisor.phase is Phase.RUNNING
 
@@ -114,7 +114,7 @@ def test_supervisor_is_silent_when_the_growing_limit_bites() -> None:
     for k in range(512):
         _period(supervisor, k * _PERIOD, 1.0)
     assert supervisor.limits.clamped == 0
-    assert {event.level for event in events} == {"PHASE"}
+    assert {event.kind for event in events} == {EventKind.PHASE}
 
 
 def test_supervisor_lets_everything_through_when_there_is_no_limit() -> None:
@@ -175,7 +175,7 @@ def test_supervisor_ends_in_an_orderly_way_when_the_voltage_is_limited_for_half_
     assert seen[-1][1] == 0.0
     ramp = [voltage for t, voltage in seen if t >= 0.5]
     assert ramp == pytest.approx([10.0 * (1.0 - k * _PERIOD / 0.05) for k in range(len(ramp) - 1)] + [0.0])
-    assert [event.text for event in events if event.level == "PHASE"][-2:] == ["stopping", "tripped"]
+    assert [event.text for event in events if event.kind is EventKind.PHASE][-2:] == ["stopping", "tripped"]
 
 
 def test_supervisor_goes_to_zero_at_once_when_a_fault_comes_into_an_orderly_end() -> None:

@@ -8,6 +8,7 @@ from rich.live import Live
 from rich.text import Text
 
 from dcmp_hil.telemetry.statistics import Durations
+from dcmp_hil.values import PhaseData
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -50,8 +51,8 @@ class StatusLine:
 
     def event(self, event: Event) -> None:
         """Print warnings; remember the phase. An error is the run's end, which says it itself, once."""
-        if event.level == "PHASE":
-            self._phase = event.text
+        if isinstance(event.data, PhaseData):
+            self._phase = event.data.phase
         elif event.level == "WARN":
             self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING))
 

@@ -15,6 +15,8 @@ from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_f
 from dcmp_hil.probe import probe_for
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pydantic import BaseModel
 
     from dcmp_hil.config.rig import Rig
@@ -52,13 +54,31 @@ def _kinds(prefix: str, name: str) -> str:
     return f"Kind: {kinds_in_words(section)}." if name == "kind" and section in KINDS else ""
 
 
-def _by_rule(name: str, rig: Rig) -> str:
-    """Show what the rule makes of a key that was left out."""
+def numbers(rig: Rig) -> dict[str, float]:
+    """Return every number of a rig by its dotted key, those by rule worked out."""
+    return dict(_numbers(rig, "", rig))
+
+
+def _numbers(section: BaseModel, prefix: str, rig: Rig) -> Iterator[tuple[str, float]]:
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        if hasattr(value, "model_fields_set"):
+            yield from _numbers(value, f"{prefix}{name}.", rig)
+        value = by_rule(name, rig) if value is None else value
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{prefix}{name}", float(value)
+
+
+def by_rule(name: str, rig: Rig) -> float | None:
+    """Return what the rule makes of a key that was left out; None where there is no rule."""
     if name == "mu0_rad_s":
-        return f"{bandwidth_floor(rig.encoder.counts, rig.period):.4g} (by rule)"
-    if name == "M_rad_s3":
-        return f"{slope_bound(rig.encoder.counts):g} (by rule)"
-    return "none"
+        return bandwidth_floor(rig.encoder.counts, rig.period)
+    return slope_bound(rig.encoder.counts) if name == "M_rad_s3" else None
+
+
+def _by_rule(name: str, rig: Rig) -> str:
+    value = by_rule(name, rig)
+    return "none" if value is None else f"{value:.4g} (by rule)"
 
 
 def warnings(rig: Rig) -> list[str]:

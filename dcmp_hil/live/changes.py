@@ -6,10 +6,9 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.controllers import Gains
-from dcmp_hil.live.change import applied
 from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING, Answer
 from dcmp_hil.supervisor import Phase
-from dcmp_hil.values import Event
+from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,8 +90,8 @@ class LiveChanges:
 
     def event(self, event: Event) -> None:
         """Pass an event on; a new phase is shown in the mailbox."""
-        if event.level == "PHASE":
-            self._mailbox.tell_phase(_PLACES.get(event.text, 0))
+        if isinstance(event.data, PhaseData):
+            self._mailbox.tell_phase(_PLACES[event.data.phase])
         self._notify(event)
 
     def warn(self, sentence: str) -> None:
@@ -109,7 +108,7 @@ class LiveChanges:
             self._ramp = None
         self._seen = number if self._ramp is None else _AWAKE
         while self._news:
-            self._notify(Event(t, "WARN", self._news.popleft()))
+            self._notify(Event(t, "WARN", EventKind.CONTROL, self._news.popleft()))
 
     def _take(self, number: int, t: float) -> None:
         try:
@@ -119,12 +118,13 @@ class LiveChanges:
             what = self._make(change, t)
         except Exception as error:  # noqa: BLE001 - whatever is in the slot, the run goes on
             self._mailbox.reply(number, Answer(FAILED, t))
-            self._notify(Event(t, "WARN", f"a change could not be applied: {error!r}"))
+            sentence = f"a change could not be applied: {error!r}"
+            self._notify(Event(t, "WARN", EventKind.CONTROL, sentence))
             return
         self._mailbox.reply(number, Answer(what, t))
         if what == APPLIED:
-            sentence = applied(change.words, t)
-            self._notify(Event(t, "INFO", sentence))
+            sentence = f"{change.words}, applied at t = {t:.3f} s"
+            self._notify(Event(t, "INFO", EventKind.CHANGE, sentence, ChangeData(change.values)))
             if len(self.made) < _KEPT:
                 self.made.append(sentence)
 

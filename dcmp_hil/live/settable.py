@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import observers
 from dcmp_hil.config import change_rig
-from dcmp_hil.config.explain import warnings
+from dcmp_hil.config.explain import by_rule, warnings
 from dcmp_hil.config.loop_rules import holds
 from dcmp_hil.config.reach import beyond_reach
 from dcmp_hil.config.sections import Custom
@@ -14,11 +14,11 @@ from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.change import Change
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.references.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dcmp_hil.config import Rig
 
@@ -44,10 +44,7 @@ def value_of(rig: Rig, key: str) -> Any:
     """Return what a settable key is; what the rig leaves to a rule is worked out."""
     section, name = key.split(".")
     value = getattr(getattr(rig, section), name)
-    if value is None:
-        counts = rig.encoder.counts
-        return bandwidth_floor(counts, rig.period) if name == "mu0_rad_s" else slope_bound(counts)
-    return value
+    return by_rule(name, rig) if value is None else value
 
 
 def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
@@ -129,7 +126,6 @@ def _known(rig: Rig, key: str) -> bool:
 
 
 def _worked_out(before: Rig, after: Rig) -> Change:
-    words = in_words(before, after)
     gains = tuning = None
     if isinstance(after.controller, PdSettings) and after.controller != before.controller:
         gains = after.controller.gains
@@ -138,23 +134,30 @@ def _worked_out(before: Rig, after: Rig) -> Change:
             observers.ObserverContext(after.model.values(), after.period, after.encoder.counts)
         )
     reference = after.reference if after.reference != before.reference else None
-    return Change(words, gains, tuning, reference)
+    values = _different(before, after)
+    return Change(_in_words(before, values), values, gains, tuning, reference)
 
 
-def in_words(before: Rig, after: Rig) -> str:
-    """Say what is different: "controller.kp_1_s2: 4000 -> 5200"."""
+def _different(before: Rig, after: Rig) -> dict[str, float | str]:
+    """Return the new value of every key that is different."""
     old = {key: value_of(before, key) for key in settable(before)}
     new = {key: value_of(after, key) for key in settable(after)}
+    return {key: value for key, value in new.items() if old.get(key) != value}
+
+
+def _in_words(before: Rig, values: Mapping[str, float | str]) -> str:
+    """Say what is different: "controller.kp_1_s2: 4000 -> 5200"."""
+    known = settable(before)
     said = [
-        f"{key}: {_shown(old[key])} -> {_shown(value)}" if key in old else f"{key} = {_shown(value)}"
-        for key, value in new.items()
-        if old.get(key) != value
+        f"{key}: {_shown(value_of(before, key))} -> {_shown(value)}"
+        if key in known
+        else f"{key} = {_shown(value)}"
+        for key, value in values.items()
     ]
     return ", ".join(said) or "nothing is different"
 
 
 def _shown(value: Any) -> str:
-    """Write a value so that it comes back the same: a recording is run again by these words."""
     if not isinstance(value, float):
         return toml_value(value)
     short = f"{value:.6g}"

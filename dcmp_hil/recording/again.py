@@ -16,7 +16,7 @@ from dcmp_hil.predictor import Predictor
 from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.trajectory import Trajectory
-from dcmp_hil.values import Reference, Sample
+from dcmp_hil.values import EventKind, Reference, Sample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Event
 
 _AT = {name: place for place, name in enumerate(FIELDS)}
-_LOWERING = "lowering the arm"
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,7 @@ class _Past:
 
     def __init__(self, recorded: RecordedRun, trajectory: Trajectory, delay: float) -> None:
         self._trajectory, self._delay = trajectory, delay
-        self._lowered = [event.t for event in recorded.events if event.text == _LOWERING]
+        self._lowered = [event.t for event in recorded.events if event.kind is EventKind.LOWERING]
         self._holds = True
 
     def follow(self, row: list[float], estimate: Estimate) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
-from dcmp_hil.live.change import found_in
 from dcmp_hil.live.settable import changed
+from dcmp_hil.values import ChangeData
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,8 +33,9 @@ def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
     """
     found = []
     for event in events:
-        overrides = [f"{key}={value}" for key, value in found_in(event.text).items()]
-        if overrides:
+        if isinstance(event.data, ChangeData) and event.data.values:
+            # JSON's numbers and texts are TOML's, and come back to the bit.
+            overrides = [f"{key}={json.dumps(value)}" for key, value in event.data.values.items()]
             rig, change = changed(rig, overrides)
             found.append((event.t, change))
     return found

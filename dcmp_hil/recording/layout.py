@@ -6,17 +6,20 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.values import DATA, Event, EventKind, Level
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
-    from dcmp_hil.values import Event
-
 PROFILE, LIBRARY = "ros2", "dcmp-hil"
-FORMAT = "1"
-"""Of what is said about a run; a number that this version does not know is refused."""
+FORMAT, FORMAT_1 = "2", "1"
+"""Of what is said about a run; a number that this version does not know is refused. In format 1 an event had
+no kind and no data: see `recording.format_1`."""
 CYCLES, EVENTS = "/cycles", "/events"
 RUN, RIG, SUMMARY = "run", "rig.json", "summary"
 """Names of the metadata that say what the run was, of the attached rig, and of what is known at its end."""
@@ -26,7 +29,9 @@ _UNITS = {
     "position": "rad", "velocity": "rad_s", "acceleration": "rad_s2", "disturbance": "rad_s2", "voltage": "v",
 }  # fmt: skip
 _HEADER = b"\0\1\0\0"  # of CDR: little endian
-_LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4, "PHASE": 2, "LINK": 1}  # of foxglove.Log
+_LEVELS: dict[Level, int] = {"DEBUG": 1, "INFO": 2, "WARN": 3, "ERROR": 4}  # of foxglove.Log
+_FROM_LEVELS = {number: level for level, number in _LEVELS.items()}
+_ADAPTERS = {kind: TypeAdapter(data) for kind, data in DATA.items()}
 
 
 def _with_unit(field: str) -> str:
@@ -48,7 +53,8 @@ EVENT_SCHEMA = json.dumps(
             },
             "level": {"type": "integer"},
             "message": {"type": "string"},
-            "name": {"type": "string"},
+            "name": {"type": "string", "description": "the kind of event"},
+            "data": {"type": ["object", "null"], "description": "what programs read, by kind"},
             "t": {"type": "number", "description": "device time, s"},
         },
     }
@@ -79,7 +85,29 @@ def event_to_bytes(event: Event, at_ns: int) -> bytes:
         "timestamp": {"sec": at_ns // 10**9, "nsec": at_ns % 10**9},
         "level": _LEVELS[event.level],
         "message": event.text,
-        "name": event.level,
+        "name": event.kind.value,
+        "data": event.data._asdict() if event.data else None,
         "t": event.t,
     }
     return json.dumps(document).encode()
+
+
+def event_from(document: Mapping[str, Any]) -> Event:
+    """Return the event in a JSON object; a kind that this version does not know is OTHER.
+
+    Raises
+    ------
+    ValueError
+        If something is missing, or the data are not those of the kind.
+    """
+    try:
+        t, level = float(document["t"]), _FROM_LEVELS[document["level"]]
+        name, text, data = document["name"], str(document["message"]), document["data"]
+        if name not in set(EventKind):
+            return Event(t, level, EventKind.OTHER, text)
+        kind = EventKind(name)
+        if kind not in _ADAPTERS:
+            return Event(t, level, kind, text)
+        return Event(t, level, kind, text, _ADAPTERS[kind].validate_python(data))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError("an event that this version cannot read") from error

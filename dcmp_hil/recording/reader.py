@@ -13,11 +13,11 @@ from pydantic import ValidationError
 
 from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.recording.layout import FORMAT, RIG, RUN, to_row
+from dcmp_hil.recording.format_1 import event_of_format_1
+from dcmp_hil.recording.layout import FORMAT, FORMAT_1, RIG, RUN, event_from, to_row
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.signals import columns
-from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from typing import IO
 
     from numpy.typing import NDArray
+
+    from dcmp_hil.values import Event
 
 
 @dataclass(frozen=True)
@@ -92,10 +94,10 @@ def _read(path: Path, file: IO[bytes]) -> RecordedRun:
     found = _Found()
     for record in _records(file, found):
         if isinstance(record, Message):
-            found.take(record)
+            _take(path, found, record)
         elif isinstance(record, Metadata) and record.name == RUN:
             found.run = record.metadata
-            if found.run.get("format") != FORMAT:
+            if found.run.get("format") not in {FORMAT, FORMAT_1}:
                 raise ConfigError(
                     f"{path}: a recording of format {found.run.get('format')}; this version reads {FORMAT}. "
                     f"Use dcmp-hil {found.run.get('version', 'of that time')}."
@@ -107,6 +109,13 @@ def _read(path: Path, file: IO[bytes]) -> RecordedRun:
     rig = _rig(path, found.run, found.rig)
     rows = np.array(found.rows) if found.rows else np.empty((0, len(FIELDS)))
     return RecordedRun(path, rig, found.run, rows, tuple(found.events), found.complete)
+
+
+def _take(path: Path, found: _Found, message: Message) -> None:
+    try:
+        found.take(message)
+    except ValueError as error:
+        raise ConfigError(f"{path}: something in it cannot be read ({error}).") from None
 
 
 def _rig(path: Path, run: dict[str, str], table: dict[str, Any]) -> Rig:
@@ -143,9 +152,15 @@ class _Found:
         self.complete = False
 
     def take(self, message: Message) -> None:
-        """Take a period or an event: JSON begins with a brace, CDR with a zero."""
+        """Take a period or an event: JSON begins with a brace, CDR with a zero.
+
+        Raises
+        ------
+        ValueError
+            If it is neither.
+        """
         if message.data[:1] == b"{":
-            document = json.loads(message.data)
-            self.events.append(Event(document["t"], document["name"], document["message"]))
+            known = event_of_format_1 if self.run and self.run.get("format") == FORMAT_1 else event_from
+            self.events.append(known(json.loads(message.data)))
         else:
             self.rows.append(to_row(message.data))

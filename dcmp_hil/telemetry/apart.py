@@ -28,7 +28,7 @@ from dcmp_hil.telemetry.child import DONE, FIGURES, UP, Setup, State
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
 from dcmp_hil.telemetry.ring import Ring, size_of
 from dcmp_hil.telemetry.shared import Ledger, mapped, reserve
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -216,9 +216,10 @@ class Apart:
 
     def _send_events(self) -> None:
         while self._untold and self._channel:
-            t, level, text = self._untold[0]
+            event = self._untold[0]
+            message = pickle.dumps(tuple(event._replace(text=event.text[:_LONGEST])))
             try:
-                self._channel.send(pickle.dumps((t, level, text[:_LONGEST])), socket.MSG_DONTWAIT)
+                self._channel.send(message, socket.MSG_DONTWAIT)
             except OSError:  # no room, or nobody: what nobody takes is taken over at the end
                 return
             self._untold.popleft()
@@ -248,6 +249,6 @@ class Apart:
         )
 
     def _warn(self, take: Callable[[Event], None], sentence: str) -> None:
-        take(Event(self.ring.newest, "WARN", sentence))
+        take(Event(self.ring.newest, "WARN", EventKind.TELEMETRY, sentence))
         if self._warn_user:
             self._warn_user(sentence)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -97,7 +97,7 @@ class Audience:
         for sink in self._sinks:
             warnings = _warnings(sink)
             for sentence in warnings[self._warned[id(sink)] :]:
-                self._report(Event(self.ring.newest, "WARN", sentence))
+                self._report(Event(self.ring.newest, "WARN", EventKind.TELEMETRY, sentence))
             self._warned[id(sink)] = len(warnings)
 
     def _tell(self, call: Callable[[Sink], None], sinks: Sequence[Sink] | None = None) -> None:
@@ -107,7 +107,7 @@ class Audience:
             except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
                 self._sinks = [other for other in self._sinks if other is not sink]
                 sentence = f"{type(sink).__name__} gave up and was dropped: {error}"
-                self._report(Event(self.ring.newest, "WARN", sentence))
+                self._report(Event(self.ring.newest, "WARN", EventKind.TELEMETRY, sentence))
 
 
 def _warnings(sink: Sink) -> Sequence[str]:

@@ -26,7 +26,7 @@ from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
 from dcmp_hil.telemetry.outlet import THREAD
 from dcmp_hil.telemetry.ring import Ring, size_of
 from dcmp_hil.telemetry.shared import Ledger, mapped
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from dcmp_hil.model import Model
@@ -120,7 +120,7 @@ class _Watcher:
             return
         self._say(UP)
         for sentence in warnings:
-            self._tell(Event(0.0, "WARN", sentence))
+            self._tell(Event(0.0, "WARN", EventKind.TELEMETRY, sentence))
         with select.epoll() as waiting:
             waiting.register(self._channel, select.EPOLLIN)
             while True:

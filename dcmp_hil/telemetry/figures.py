@@ -9,7 +9,7 @@ import numpy as np
 
 from dcmp_hil.telemetry.shared import Log
 from dcmp_hil.telemetry.signals import columns, names
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,7 +52,7 @@ class Figures:
         """Take an event; the first warnings and errors are kept in any case."""
         if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
             self.troubles.append(f"{event.t:.3f} s: {event.text[:_LONGEST]}")
-        if self.keeper and event.level != "LINK":  # what they came to is in the result
+        if self.keeper and event.kind is not EventKind.LINK:  # what they came to is in the result
             self.keeper.event(event)
 
     def close(self) -> None:

@@ -10,11 +10,12 @@ import rerun as rr
 from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.histogram import Histogram
 from dcmp_hil.telemetry.lanes import Lane
-from dcmp_hil.telemetry.link import counters
+from dcmp_hil.telemetry.link import in_order
 from dcmp_hil.telemetry.parameters import PATH, RELATIVE, Parameters, line_of, table_of
 from dcmp_hil.telemetry.portrait import Portrait
 from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
 from dcmp_hil.telemetry.signals import by_plot
+from dcmp_hil.values import LinkData, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +57,7 @@ class Frames:
         self._lanes = {name: Lane() for name in ("voltage", "samples")}
         self._last_slot = -1
         self._portrait = Portrait()
-        self._parameters = Parameters(rig.parameters, rig.kinds)
+        self._parameters = Parameters(rig.parameters, rig.kinds, rig.numbers)
         self._bucket = rows_per_bucket(rig.period)
 
     def choose_lines(self, block: Block) -> None:
@@ -81,10 +82,10 @@ class Frames:
     def of_event(self, event: Event) -> list[Call]:
         """Return the calls for an event."""
         t = np.array([event.t])
-        if event.level == "PHASE":
-            return [self._state("phase", t, [event.text])]
-        if event.level == "LINK":
-            counts = np.array([list(counters(event.text).values())])
+        if isinstance(event.data, PhaseData):
+            return [self._state("phase", t, [event.data.phase])]
+        if isinstance(event.data, LinkData):
+            counts = np.array([in_order(event.data.counters)])
             return [(LINK, self._times(t), rr.Scalars.columns(scalars=counts))]
         told = rr.TextLog.columns(text=[event.text], level=[event.level])
         return [("events/log", self._times(t), told), *self._changed(event)]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.values import Event
+from dcmp_hil.values import CauseData, Event, EventKind, LinkData
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from dcmp_hil.wire.quality import Concern, LinkCounters
 
@@ -46,7 +47,9 @@ class LinkWatch:
         self._left -= 1
         if not self._left:
             self._left = self._periods
-            self._tell(Event(t, "LINK", in_text(self._backend)))
+            counters = told_by(self._backend)
+            text = " ".join(f"{name}={count}" for name, count in counters.items())
+            self._tell(Event(t, "DEBUG", EventKind.LINK, text, LinkData(counters)))
             self._judge(t)
 
     def finish(self, t: float) -> None:
@@ -72,20 +75,20 @@ class LinkWatch:
         for concern in found:
             if concern.cause not in self.concerns:
                 self.concerns[concern.cause] = concern
-                self._tell(Event(t, "WARN", concern.text))
+                cause = CauseData(concern.cause)
+                self._tell(Event(t, "WARN", EventKind.LINK_CONCERN, concern.text, cause))
 
 
-def in_text(backend: Any) -> str:
+def told_by(backend: Any) -> dict[str, int]:
     """Return the counters of both sides, those of the device as far as it told them."""
     told = backend.counters
     counters: dict[str, int] = {name: getattr(told, name) for name in HOST}
     health = getattr(backend, "health", None)
     if health is not None:
         counters |= {name: getattr(health, name) for name in DEVICE}
-    return " ".join(f"{name}={count}" for name, count in counters.items())
+    return counters
 
 
-def counters(text: str) -> dict[str, float]:
-    """Return the counters in the text of an event; NaN for what nobody told."""
-    told = dict(pair.split("=") for pair in text.split())
-    return {name: float(told.get(name, "nan")) for name in (*HOST, *DEVICE)}
+def in_order(counters: Mapping[str, int]) -> list[float]:
+    """Return the counters of HOST, then of DEVICE; NaN for what nobody told."""
+    return [float(counters.get(name, math.nan)) for name in (*HOST, *DEVICE)]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.live.change import found_in
+from dcmp_hil.config.words import toml_value
+from dcmp_hil.values import ChangeData
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -26,13 +27,20 @@ class Parameters:
         Name and value, as the run begins.
     kinds
         What the keys of a section and kind are called.
+    numbers
+        Of the rows, those that are numbers, as the run begins.
     """
 
-    def __init__(self, rows: Iterable[tuple[str, str]], kinds: Mapping[str, Iterable[str]]) -> None:
+    def __init__(
+        self,
+        rows: Iterable[tuple[str, str]],
+        kinds: Mapping[str, Iterable[str]],
+        numbers: Mapping[str, float],
+    ) -> None:
         self.rows = dict(rows)
         self._kinds = {kind: set(keys) for kind, keys in kinds.items()}
-        numbers = {key: number(value) for key, value in self.rows.items() if key.startswith(_TUNED)}
-        self._start = {key: value for key, value in numbers.items() if math.isfinite(value) and value}
+        self._numbers = dict(numbers)
+        self._start = {key: value for key, value in self.numbers() if value}
 
     @property
     def drawn(self) -> tuple[str, ...]:
@@ -42,21 +50,22 @@ class Parameters:
     @property
     def relative(self) -> list[float]:
         """Each of `drawn` over what it was at the start; NaN once it is gone."""
-        return [number(self.rows.get(key, "")) / start for key, start in self._start.items()]
+        return [self._numbers.get(key, math.nan) / start for key, start in self._start.items()]
 
     def numbers(self) -> Iterator[tuple[str, float]]:
         """Yield what is tuned and a number."""
-        for key, text in self.rows.items():
-            value = number(text)
+        for key, value in self._numbers.items():
             if key.startswith(_TUNED) and math.isfinite(value):
                 yield key, value
 
     def take(self, event: Event) -> dict[str, float] | None:
         """Take an event; return the numbers that it changed, None if it tells of no change."""
-        changed = {key: value.strip('"') for key, value in found_in(event.text).items()}
-        if not changed:
+        if not isinstance(event.data, ChangeData):
             return None
-        self.rows |= changed
+        changed = event.data.values
+        for key, value in changed.items():
+            self.rows[key] = value if isinstance(value, str) else toml_value(value)
+            self._numbers[key] = math.nan if isinstance(value, str) else value
         for key in changed:
             if key.endswith(".kind"):
                 self._keep_those_of(key)
@@ -66,9 +75,9 @@ class Parameters:
         """Forget what the kind before had and the new one has not."""
         section, _, _ = kind.partition(".")
         known = self._kinds.get(f"{kind}={self.rows[kind]}", ())
-        self.rows = {
-            key: v for key, v in self.rows.items() if not key.startswith(f"{section}.") or key in known
-        }
+        for key in [key for key in self.rows if key.startswith(f"{section}.") and key not in known]:
+            del self.rows[key]
+            self._numbers.pop(key, None)
 
 
 def line_of(key: str) -> str:
@@ -79,11 +88,3 @@ def line_of(key: str) -> str:
 def table_of(head: str, rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of names and values, in Markdown."""
     return "\n".join([f"| {head} | |", "|:--|:--|", *(f"| {name} | {value} |" for name, value in rows)])
-
-
-def number(text: str) -> float:
-    """Return the number that a value begins with; NaN for none."""
-    try:
-        return float(text.partition(" ")[0])
-    except ValueError:
-        return math.nan

@@ -22,7 +22,7 @@ from dcmp_hil.telemetry.frames import Frames
 from dcmp_hil.telemetry.outlet import Outlet, room_for
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.scenery import log_scenery, log_style
-from dcmp_hil.values import Event
+from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     import subprocess
@@ -96,7 +96,6 @@ class RerunSink:
         port: int = window.PORT,
     ) -> None:
         self.warnings: list[str] = []
-        self._logged: set[str] = set()
         self.port: int | None = None
         self._window: subprocess.Popen[bytes] | None = None
         self._rig = rig
@@ -122,17 +121,15 @@ class RerunSink:
         if not self._frames.plots:
             self._frames.choose_lines(block)
             self._tell(partial(_log_styles, self._frames.plots))
-        t = float(block["t"][-1])
-        self._tell(partial(_send, self._frames.of_block(block)), t)
+        self._tell(partial(_send, self._frames.of_block(block)))
         if self._window and (code := self._window.poll()) is not None:
             self._window = None
             if code:  # closed by the user it is 0
-                self._warn(t, _NO_WINDOW.format(code=code, port=self.port))
+                self.warnings.append(_NO_WINDOW.format(code=code, port=self.port))
 
     def event(self, event: Event) -> None:
-        """Take an event; one of our own warnings that comes back is there already."""
-        if event.text not in self._logged:
-            self._log(event)
+        """Take an event."""
+        self._tell(partial(_send, self._frames.of_event(event)))
 
     def close(self) -> None:
         """Write what is left, and give up after 12 s at most; a second call waits for the first."""
@@ -148,7 +145,7 @@ class RerunSink:
         if faults:
             raise RuntimeError(faults[0])
 
-    def _tell(self, job: Job, t: float = 0.0) -> None:
+    def _tell(self, job: Job) -> None:
         for outlet in tuple(self._outlets):
             try:
                 sentence = "" if outlet.do(job) else _stuck(outlet)
@@ -157,15 +154,7 @@ class RerunSink:
                 sentence = f"{_incomplete(outlet, str(error))} The run goes on."
             if sentence:
                 self._outlets.remove(outlet)
-                self._warn(t, sentence)
-
-    def _warn(self, t: float, sentence: str) -> None:
-        self.warnings.append(sentence)
-        self._logged.add(sentence)
-        self._log(Event(t, "WARN", sentence))
-
-    def _log(self, event: Event) -> None:
-        self._tell(partial(_send, self._frames.of_event(event)), event.t)
+                self.warnings.append(sentence)
 
     def _stream(self) -> rr.RecordingStream:
         return rr.RecordingStream(self._application, recording_id=self._recording)
@@ -288,7 +277,14 @@ def _warm_up(rig: RigView) -> None:
     frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
     frames.choose_lines(block)
     stream = rr.RecordingStream("warm-up")
-    _send([*frames.of_start(), *frames.of_block(block), *frames.of_event(Event(0.0, "INFO", ""))], stream)
+    _send(
+        [
+            *frames.of_start(),
+            *frames.of_block(block),
+            *frames.of_event(Event(0.0, "INFO", EventKind.OTHER, "")),
+        ],
+        stream,
+    )
     stream.disconnect()
 
 

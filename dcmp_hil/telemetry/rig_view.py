@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.explain import explain
+from dcmp_hil.config.explain import explain, numbers
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.host import host_facts
 from dcmp_hil.model import UNKNOWN_MODEL
@@ -44,6 +44,8 @@ class RigView:
         Rows of the table of versions and of the computer.
     kinds
         "reference.kind=sine" to the keys of that kind, for what may change in a run.
+    numbers
+        Of the parameters, those that are numbers.
     """
 
     name: str
@@ -55,6 +57,7 @@ class RigView:
     wired: bool = False
     about: tuple[tuple[str, str], ...] = ()
     kinds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
 
 
 _FIRST = ("controller", "observer", "reference", "loop")  # what is tuned stands where nobody need scroll
@@ -74,6 +77,7 @@ def view_of(rig: Rig) -> RigView:
         wired=rig.backend.device or not rig.backend.simulated,
         about=_about(),
         kinds=_kinds(),
+        numbers=numbers(rig),
     )
 
 

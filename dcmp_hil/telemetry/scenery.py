@@ -111,7 +111,7 @@ def _log_about(stream: rr.RecordingStream, rig: RigView) -> None:
 
 
 def _style_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
-    names = Parameters(rig.parameters, rig.kinds).drawn
+    names = Parameters(rig.parameters, rig.kinds, rig.numbers).drawn
     style = rr.SeriesLines(
         names=list(names),
         colors=[_APART[k % len(_APART)] for k in range(len(names))],

@@ -47,7 +47,7 @@ def test_orderly_end_takes_fifty_milliseconds_and_leaves_the_device_idle(
     assert board.applied_mV == 0
     assert not board.enable
     result = session.result()
-    phases = {event.text: event.t for event in result.events if event.level == "PHASE"}
+    phases = {event.text: event.t for event in result.events if event.kind == "phase"}
     assert phases["tripped"] - phases["stopping"] == pytest.approx(0.05, abs=0.004)
     t, sent = result.columns["time_s"], np.abs(result.columns["voltage_sent_V"])
     ramp = sent[t > phases["stopping"]]

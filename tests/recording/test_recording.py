@@ -28,7 +28,7 @@ from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry.ring import FIELDS, Ring, size_of
-from dcmp_hil.values import Event
+from dcmp_hil.values import CauseData, Event, EventKind
 from tests.helpers import bench
 from tests.telemetry.runs import EVENTS, blocks, cycle, truth
 
@@ -86,11 +86,11 @@ def test_numbers_that_are_none_survive(tmp_path: Path) -> None:
     rig = bench()
     sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
     sink.block(block)
-    sink.event(Event(math.inf, "ERROR", "so late"))
+    sink.event(Event(math.inf, "ERROR", EventKind.TRIP, "so late", CauseData("late")))
     sink.close()
     read = read_run(tmp_path / "run.mcap")
     assert read.rows.tobytes() == block.rows.tobytes()
-    assert read.events == (Event(math.inf, "ERROR", "so late"),)
+    assert read.events == (Event(math.inf, "ERROR", EventKind.TRIP, "so late", CauseData("late")),)
 
 
 def test_ros_reads_every_number_of_every_period(tmp_path: Path) -> None:
@@ -236,8 +236,8 @@ def test_what_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
 
 def test_a_newer_format_is_refused_by_name(tmp_path: Path) -> None:
     rig = bench()
-    Recording(tmp_path / "run.mcap", rig.period, about(rig) | {"format": "2"}, rig_json(rig)).close()
-    with pytest.raises(ConfigError, match="a recording of format 2; this version reads 1"):
+    Recording(tmp_path / "run.mcap", rig.period, about(rig) | {"format": "3"}, rig_json(rig)).close()
+    with pytest.raises(ConfigError, match="a recording of format 3; this version reads 2"):
         read_run(tmp_path)
 
 

@@ -9,7 +9,7 @@ from dcmp_hil.errors import TripError
 from dcmp_hil.limits import Limits
 from dcmp_hil.monitors import Finite
 from dcmp_hil.supervisor import Phase, Supervisor
-from dcmp_hil.values import Estimate, Event, Fault, Sample
+from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.device import DeviceBackend
@@ -94,9 +94,9 @@ class Host:
         return MOST * max(0.0, 1.0 - gone / STOP) + 1e-9 if phase is Phase.STOPPING else MOST
 
     def _notified(self, event: Event) -> None:
-        if event.level != "PHASE":
+        if not isinstance(event.data, PhaseData):
             return
-        phase = Phase(event.text)
+        phase = Phase(event.data.phase)
         if _ORDER.index(phase) <= _ORDER.index(self._phase):
             self.judge.note(f"from {self._phase} to {phase}")
         self._phase, self._since = phase, event.t

@@ -12,7 +12,19 @@ from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.rig_view import RigView
 from dcmp_hil.telemetry.ring import Ring
-from dcmp_hil.values import UNKNOWN_TRUTH, Cycle, Estimate, Event, Reference, Sample, Timing, Truth
+from dcmp_hil.values import (
+    UNKNOWN_TRUTH,
+    Cycle,
+    Estimate,
+    Event,
+    EventKind,
+    LimitData,
+    PhaseData,
+    Reference,
+    Sample,
+    Timing,
+    Truth,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,11 +42,11 @@ VIEW = RigView(
     period=T,
 )
 EVENTS = (
-    Event(0.0, "PHASE", "settling"),
-    Event(0.25, "PHASE", "engaging"),
-    Event(0.5, "PHASE", "running"),
-    Event(0.6, "WARN", "voltage limited: 12.0 V asked for, 10.0 V allowed"),
-    Event(0.9, "INFO", "amplifier at 0 V"),
+    Event(0.0, "INFO", EventKind.PHASE, "it settles", PhaseData("settling")),
+    Event(0.25, "INFO", EventKind.PHASE, "it engages", PhaseData("engaging")),
+    Event(0.5, "INFO", EventKind.PHASE, "it runs", PhaseData("running")),
+    Event(0.6, "WARN", EventKind.LIMIT, "12.0 V asked for, 10.0 V allowed", LimitData("voltage")),
+    Event(0.9, "INFO", EventKind.END, "amplifier at 0 V"),
 )
 
 

@@ -22,7 +22,7 @@ from dcmp_hil.telemetry import apart as module
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.values import UNKNOWN_TRUTH, Event, Reference
+from dcmp_hil.values import UNKNOWN_TRUTH, Event, EventKind, Reference
 from tests.helpers import bench, cycle
 from tests.telemetry.runs import VIEW, values
 
@@ -149,8 +149,8 @@ def test_a_run_gives_the_same_figures_and_columns_from_there() -> None:
     ):
         assert getattr(there.summary, figure) == pytest.approx(getattr(here.summary, figure), rel=1e-12)
     assert there.summary.lateness_us.max == pytest.approx(there.columns["lateness_us"].max(), abs=1e-3)
-    texts = [event.text for event in there.events if event.level == "PHASE"]
-    assert texts == [event.text for event in here.events if event.level == "PHASE"]
+    texts = [event.text for event in there.events if event.kind is EventKind.PHASE]
+    assert texts == [event.text for event in here.events if event.kind is EventKind.PHASE]
 
 
 def test_a_sink_that_is_made_there_sees_every_row_and_event(tmp_path: Path) -> None:
@@ -256,7 +256,7 @@ def test_events_never_block_and_come_back_although_nobody_takes_them() -> None:
     longest = 0.0
     for k in range(3000):  # more than a socket holds
         began = time.monotonic()
-        apart.event(Event(k * _T, "INFO", f"event {k} " + "x" * 200))
+        apart.event(Event(k * _T, "INFO", EventKind.OTHER, f"event {k} " + "x" * 200))
         longest = max(longest, time.monotonic() - began)
     apart.close()
     assert longest < 1.0

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil import load_rig
-from dcmp_hil.live.change import applied
 from dcmp_hil.live.settable import changed
 from dcmp_hil.telemetry.parameters import Parameters
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.rig_view import view_of
-from dcmp_hil.values import Event
+from dcmp_hil.values import ChangeData, Event, EventKind
 from tests.telemetry.runs import blocks, read_back
 
 if TYPE_CHECKING:
@@ -25,12 +24,12 @@ RIG = load_rig("bench-1khz")
 def change(*overrides: str, t: float = 0.5) -> Event:
     """Return the event of a change as the loop tells of it."""
     _, made = changed(RIG, overrides)
-    return Event(t, "INFO", applied(made.words, t))
+    return Event(t, "INFO", EventKind.CHANGE, "in words", ChangeData(made.values))
 
 
 def parameters() -> Parameters:
     view = view_of(RIG)
-    return Parameters(view.parameters, view.kinds)
+    return Parameters(view.parameters, view.kinds, view.numbers)
 
 
 def test_a_change_is_in_the_table_and_over_what_it_was_at_the_start() -> None:
@@ -51,7 +50,7 @@ def test_a_change_is_in_the_table_and_over_what_it_was_at_the_start() -> None:
 @pytest.mark.parametrize("text", ["lowering the arm", "loop.rate_hz: 500 -> 1000", ""])
 def test_other_events_change_nothing(text: str) -> None:
     found = parameters()
-    assert found.take(Event(0.5, "INFO", text)) is None
+    assert found.take(Event(0.5, "INFO", EventKind.OTHER, text)) is None
     assert found.rows == parameters().rows
 
 

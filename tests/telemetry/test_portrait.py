@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,15 +12,13 @@ from hypothesis import strategies as st
 from dcmp_hil.model import Model
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
-from dcmp_hil.telemetry.link import DEVICE, HOST, LinkWatch, counters
+from dcmp_hil.telemetry.link import DEVICE, HOST, LinkWatch, in_order
 from dcmp_hil.telemetry.portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns
+from dcmp_hil.values import Event, EventKind, LinkData
 from dcmp_hil.wire.messages import Health
 from dcmp_hil.wire.quality import LinkCounters
 from tests.telemetry.runs import blocks
-
-if TYPE_CHECKING:
-    from dcmp_hil.values import Event
 
 
 @pytest.mark.parametrize(
@@ -98,6 +95,11 @@ def test_thinning_keeps_the_order_of_peaks_and_ignores_nan() -> None:
 # --------------------------------------------------------------------------------------------------- link
 
 
+def _counters(event: Event) -> dict[str, float]:
+    assert isinstance(event.data, LinkData)
+    return dict(zip((*HOST, *DEVICE), in_order(event.data.counters), strict=True))
+
+
 def test_link_is_told_of_once_a_second_and_only_where_there_is_one() -> None:
     told: list[Event] = []
     backend = SimpleNamespace(counters=LinkCounters(lost=3, corrupt=1), health=None)
@@ -105,15 +107,15 @@ def test_link_is_told_of_once_a_second_and_only_where_there_is_one() -> None:
     for k in range(2500):
         watch.look(1e-3 * k)
     assert [event.t for event in told] == pytest.approx([0.999, 1.999])
-    assert {event.level for event in told} == {"LINK"}
-    counts = counters(told[0].text)
+    assert {event.kind for event in told} == {EventKind.LINK}
+    counts = _counters(told[0])
     assert list(counts) == [*HOST, *DEVICE]
     assert (counts["lost"], counts["corrupt"]) == (3.0, 1.0)
     assert np.isnan(counts["crc_errors"])
     backend.health = Health(7, 0, 0, 0, 2, 90)
     for k in range(1000):
         watch.look(3.0 + 1e-3 * k)
-    assert counters(told[-1].text)["crc_errors"] == 7.0
+    assert _counters(told[-1])["crc_errors"] == 7.0
     LinkWatch(object(), 1, told.append).look(0.0)
     assert len(told) == 3
 

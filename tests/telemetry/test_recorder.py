@@ -10,7 +10,7 @@ import pytest
 from dcmp_hil.telemetry import recorder as module
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
-from dcmp_hil.values import UNKNOWN_TRUTH, Event, Reference
+from dcmp_hil.values import UNKNOWN_TRUTH, Event, EventKind, Reference
 from tests.helpers import cycle
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def test_recorder_delivers_everything_in_order(in_line: bool) -> None:
     sink, other = _Sink(), _Sink()
     recorder = _recorder(sink, other, in_line=in_line)
     for part in range(10):
-        recorder.event(Event(float(part), "INFO", f"part {part}"))
+        recorder.event(Event(float(part), "INFO", EventKind.OTHER, f"part {part}"))
         _record(recorder, 1000, 1000 * part)
     recorder.close()
     for each in (sink, other):
@@ -110,7 +110,7 @@ def test_recorder_keeps_the_last_cycles_only() -> None:
 def test_recorder_drops_a_sink_that_raises_and_tells_the_others(in_line: bool, at: str) -> None:
     sink = _Sink()
     recorder = _recorder(sink, _Raises(at), in_line=in_line)  # a session's own sinks come first
-    recorder.event(Event(0.0, "INFO", "begun"))
+    recorder.event(Event(0.0, "INFO", EventKind.OTHER, "begun"))
     _record(recorder, 5000)
     recorder.close()
     assert len(sink.t) == 5000
@@ -123,7 +123,7 @@ def test_recorder_drops_a_sink_that_raises_and_tells_the_others(in_line: bool, a
 def test_recorder_outlives_every_sink_that_raises() -> None:
     sinks = [_Raises(at) for at in ("block", "close", "event", "close", "block")]
     recorder = _recorder(*sinks)
-    recorder.event(Event(0.0, "INFO", "begun"))
+    recorder.event(Event(0.0, "INFO", EventKind.OTHER, "begun"))
     _record(recorder, 5000)
     recorder.close()
     assert len(recorder.recent) == 100

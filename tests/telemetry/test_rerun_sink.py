@@ -18,13 +18,14 @@ from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.audience import Audience
 from dcmp_hil.telemetry.outlet import Outlet
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.rig_view import view_of
-from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.telemetry.ring import FIELDS, Ring
 from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.telemetry.titles import title
-from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, entities, feed, read_back, values
+from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, cycle, entities, feed, read_back, truth, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -223,7 +224,13 @@ def test_a_viewer_that_takes_nothing_is_left_behind_and_the_file_stays_whole(
     sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
     monkeypatch.setattr(rerun_sink, "Outlet", _Stuck)
     sink._open_viewer(rr.GrpcSink("rerun+http://127.0.0.1:1/proxy"), 1.0)  # noqa: SLF001
-    feed(sink, periods=500)
+    ring = Ring(4096)
+    audience = Audience(ring, [sink])  # which hands a warning to every sink, this one too
+    for k in range(500):
+        ring.push(cycle(k), truth(k))
+        if k % 100 == 99:
+            audience.hand_on()
+    audience.finish()
     assert len(sink.warnings) == 1
     assert "the run goes on" in sink.warnings[0]
     assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 500
