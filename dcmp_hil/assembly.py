@@ -13,13 +13,13 @@ from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.limits import Limits
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
-from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
+from dcmp_hil.monitors import DisturbanceWatch, Finite, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins import make_named
-from dcmp_hil.plugins.checked import CheckedController, CheckedObserver, FailureMonitor
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.probe import probe_for
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
-    from dcmp_hil.plugins.checked import Failing
     from dcmp_hil.plugins.roles import Role
+    from dcmp_hil.stop import Check
     from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.values import Event
@@ -80,14 +80,13 @@ def assemble(
     changes = mailbox and LiveChanges(
         mailbox, trajectory, controller, observer, delay=rig.delay, notify=recorder.event
     )
+    outliers = make_outliers(rig)
     stages = ((observer, rig.observer), (controller, rig.controller))
-    own = [stage for stage, section in stages if isinstance(section, Custom)]
-    supervisor = make_supervisor(
-        rig, changes.event if changes else recorder.event, cast("list[Failing]", own)
-    )
+    own = [cast("Check", stage) for stage, section in stages if isinstance(section, Custom)]
+    supervisor = make_supervisor(rig, changes.event if changes else recorder.event, [outliers, *own])
     line = Line(
         backend=backend,
-        outliers=make_outliers(rig, supervisor),
+        outliers=outliers,
         observer=faults.observer(observer),
         predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
         trajectory=trajectory,
@@ -123,14 +122,14 @@ def make_controller(rig: Rig) -> Controller:
     return rig.controller.build(context)
 
 
-def make_supervisor(rig: Rig, notify: Callable[[Event], None], own: Sequence[Failing] = ()) -> Supervisor:
-    """Make the supervisor with the monitors that `[supervisor]` asks for, and one for classes of `own`."""
+def make_supervisor(rig: Rig, notify: Callable[[Event], None], first: Sequence[Check] = ()) -> Supervisor:
+    """Make the supervisor with the checks that `[supervisor]` asks for, behind those that come first."""
     limits = rig.supervisor
-    monitors: list[Monitor] = [FailureMonitor(own), Finite()] if own else [Finite()]
+    checks: list[Check] = [*first, Finite()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
-        monitors += [
+        checks += [
             Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
             DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2),
         ]
@@ -141,7 +140,7 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None], own: Sequence[Fai
         else probe_for(rig.model.values(), rig.amplifier.limit, rig.encoder.count, notify)
     )
     return Supervisor(
-        monitors,
+        checks,
         make_limits(rig, notify),
         settle=0.0 if immediate else _SETTLE,
         engage=0.0 if immediate else _ENGAGE,
@@ -171,11 +170,11 @@ def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
     )
 
 
-def make_outliers(rig: Rig, supervisor: Supervisor) -> Outliers:
+def make_outliers(rig: Rig) -> Outliers:
     """Make what leaves wrong counts out; with `monitors = "finite"` it leaves none out."""
     limits = rig.supervisor
     fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf
-    return Outliers(fastest, rig.period, rig.encoder.count, supervisor.stop_now)
+    return Outliers(fastest, rig.period, rig.encoder.count)
 
 
 def _make_custom(rig: Rig, section: Custom, role: Role, context: object) -> Any:

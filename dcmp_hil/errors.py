@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from dcmp_hil.result import Result
     from dcmp_hil.values import Cycle
@@ -62,6 +62,14 @@ class ProtocolError(BackendError):
     """What arrived contradicts the protocol, such as time that stands still."""
 
 
+class Explanation(NamedTuple):
+    """What a trip says once its cause was found: the arguments of TripError."""
+
+    reason: str
+    sentence: str
+    remedy: str
+
+
 class TripError(DcmpError):
     """The supervisor, or the device, stopped the run; the amplifier is at 0 V.
 
@@ -84,10 +92,16 @@ class TripError(DcmpError):
         self.remedy = remedy
         self.cycles: Sequence[Cycle] = ()  # the last second, filled in by the loop
         self.orderly = False  # the voltage was led to 0 V before: the device has no fault to keep
+        self.explain: Callable[[], Explanation] | None = None
 
     def explained(self) -> TripError:
         """Return it with its likely cause, which may take milliseconds to find."""
-        return self
+        if self.explain is None:
+            return self
+        trip = TripError(*self.explain())
+        for note in getattr(self, "__notes__", ()):
+            trip.add_note(note)
+        return trip
 
 
 class DeadlineError(DcmpError):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import TripError
 from dcmp_hil.governor import Bounds, Governor
+from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Event, EventKind, LimitData, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.values import Sample
+    from dcmp_hil.values import Estimate, Sample
 
 _SAID_EVERY = 1.0  # s, each limit
 _SATURATED = 0.5  # s in a row at a limit of the voltage that end the run
@@ -65,8 +65,6 @@ class Limits:
         V, either way.
     clamped
         Periods in which the demand was more than the limits allowed.
-    concern
-        Why the run should end; None while it may go on.
     """
 
     def __init__(
@@ -89,7 +87,7 @@ class Limits:
         bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
         self._governor = Governor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
-        self.concern: TripError | None = None
+        self._stop: Stop | None = None
         self._slews = slew < math.inf
         self._said: dict[str, float] = {}
         self._saturated = _Lasting(_SATURATED, _IN_A_ROW * period)
@@ -111,6 +109,10 @@ class Limits:
             return demand
         return self._limited_voltage(t, demand, last)
 
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+        """Object if a limit has acted for too long up to this period."""
+        return self._stop
+
     def slewed(self, voltage: float, last: float) -> float:
         """Return the voltage, or the nearest that the slew allows after `last` V."""
         return max(last - self._step, min(last + self._step, voltage))
@@ -119,11 +121,12 @@ class Limits:
         """Say what of a reference is limited; it is the governed one that the arm may not be off."""
         x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
-            self.concern = TripError(
+            self._stop = Stop(
                 "tracking",
                 f"The arm has been more than {self._error:g} rad off the reference for {_ASTRAY:g} s "
                 f"(reference {x:.2f} rad, position {sample.position:.2f} rad, t = {sample.t:.3f} s).",
                 "Look for an obstacle, and at the reference, the gains and supervisor.error_limit_rad.",
+                Urgency.RAMP,
             )
         if reference is not asked:
             self._say_governed(sample.t, asked)
@@ -158,12 +161,13 @@ class Limits:
     def _note_clamp(self, t: float, demand: float) -> None:
         self.clamped += 1
         if self._saturated.too_long(t):
-            self.concern = TripError(
+            self._stop = Stop(
                 "saturation",
                 f"The controller has asked for more than it may have for {_SATURATED:g} s "
                 f"({demand:.1f} V at t = {t:.3f} s, {self.voltage_limit:g} V allowed).",
                 "Ask for less in [reference], look for an obstacle, or raise amplifier.voltage_limit_V or "
                 "amplifier.slew_V_s if the amplifier has more.",
+                Urgency.RAMP,
             )
 
     def _say(self, t: float, limit: str, sentence: str) -> None:

@@ -115,10 +115,8 @@ def run(line: Line, until: float, stop: Stop) -> float:
         previous = arrived
         changes.apply(t)
 
-        if supervisor.trip is not None:
-            raise supervisor.trip
-        late = overruns.look(timing)
-        if late is not None:
-            supervisor.stop_orderly(late, t)
-        elif (t >= until or stop.requested) and not supervisor.stopping:
+        over = supervisor.check(t, overruns.check(timing))
+        if over is not None:
+            raise over.error()
+        if (t >= until or stop.requested) and not supervisor.stopping:
             return t

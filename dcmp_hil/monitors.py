@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from functools import partial
+from typing import TYPE_CHECKING
 
 from dcmp_hil.diagnosis import Diagnosis
-from dcmp_hil.errors import TripError
+from dcmp_hil.errors import Explanation
 from dcmp_hil.faults import meaning_of
+from dcmp_hil.stop import Stop
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
@@ -17,31 +19,24 @@ if TYPE_CHECKING:
 _HEALTHY = Fault.NONE  # found here faster than in its class
 
 
-class Monitor(Protocol):
-    """One thing watched, every period."""
-
-    def check(self, sample: Sample, estimate: Estimate) -> None:
-        """Raise TripError if the run must stop."""
-        ...
-
-
 class Finite:
     """Every number of sample and estimate is finite, and the device is healthy: needed on every rig."""
 
-    def check(self, sample: Sample, estimate: Estimate) -> None:
-        """Raise TripError on NaN, infinity or a device fault."""
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+        """Object to NaN, infinity and a device fault."""
         t, position, voltage, fault = sample
         if fault != _HEALTHY:
             sentence, remedy = meaning_of(fault)
-            raise TripError("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
+            return Stop("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
         x1, x2, w = estimate
         if not -math.inf < t + position + voltage + x1 + x2 + w < math.inf:  # a sum with a NaN is one
-            raise TripError(
+            return Stop(
                 "not_finite",
                 f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
                 f"estimate ({x1}, {x2}, {w}).",
                 "Look for a gain that makes the observer diverge, and at the encoder.",
             )
+        return None
 
 
 class Ranges:
@@ -59,22 +54,23 @@ class Ranges:
         self._position = position
         self._velocity = velocity
 
-    def check(self, sample: Sample, estimate: Estimate) -> None:
-        """Raise TripError outside the limits."""
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+        """Object outside the limits."""
         if not -self._velocity <= estimate.velocity <= self._velocity:
-            raise TripError(
+            return Stop(
                 "speed",
                 f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s; "
                 f"the limit is {self._velocity:g} rad/s.",
                 "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
             )
         if not -self._position <= sample.position <= self._position:
-            raise TripError(
+            return Stop(
                 "travel",
                 f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; "
                 f"the limit is {self._position:g} rad.",
                 "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
             )
+        return None
 
 
 class DisturbanceWatch:
@@ -107,34 +103,24 @@ class DisturbanceWatch:
         self._filtered = 0.0
         self._above = 0
 
-    def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - it has an estimate of its own
-        """Raise TripError, which can find the likely cause, if the disturbance was too large for too long."""
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - it has its own
+        """Object if the disturbance was too large for too long; the stop can find the likely cause."""
         self._remember(sample)
         _, _, w = self._update(sample)
         self._filtered = filtered = w + self._keep * (self._filtered - w)
         if -self._limit <= filtered <= self._limit:
             self._above = 0
-            return
+            return None
         self._above += 1
-        if self._above >= self._allowed or filtered != filtered:
-            raise _UnexplainedError(
-                self._diagnosis,
-                f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
-                f"the limit is {self._limit:g} rad/s2.",
-            )
+        if self._above < self._allowed and filtered == filtered:
+            return None
+        seen = (
+            f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
+            f"the limit is {self._limit:g} rad/s2."
+        )
+        return Stop("disturbance", f"Unknown forces: {seen}", "", explain=partial(self._explanation, seen))
 
-
-class _UnexplainedError(TripError):
-    """A trip whose cause has to be found yet: that takes longer than anybody may wait for 0 V."""
-
-    def __init__(self, diagnosis: Diagnosis, figures: str) -> None:
-        super().__init__("disturbance", f"Unknown forces: {figures}", "")
-        self._diagnosis, self._figures = diagnosis, figures
-
-    def explained(self) -> TripError:
-        """Return it with its likely cause."""
+    def _explanation(self, seen: str) -> Explanation:
+        """Find the likely cause, which takes longer than 0 V may wait."""
         reason, sentence, remedy = self._diagnosis.finding()
-        trip = TripError(reason, f"{sentence}: {self._figures}", remedy)
-        for note in getattr(self, "__notes__", ()):
-            trip.add_note(note)
-        return trip
+        return Explanation(reason, f"{sentence}: {seen}", remedy)

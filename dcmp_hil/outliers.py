@@ -6,12 +6,10 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import TripError
+from dcmp_hil.stop import Stop
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from dcmp_hil.values import Sample
+    from dcmp_hil.values import Estimate, Sample
 
 _FACTOR = 4.0  # times the velocity limit: below, the limit itself is to act
 _FLOOR = 8.0  # counts: noise and the encoder's step at high rates
@@ -29,8 +27,6 @@ class Outliers:
         s, nominal.
     count
         rad, one count of the encoder; 0 for an ideal one.
-    stop
-        Called with what is wrong and when (s, device time), once there were too many.
 
     Attributes
     ----------
@@ -38,16 +34,10 @@ class Outliers:
         Samples left out so far.
     """
 
-    def __init__(
-        self,
-        velocity_limit: float,
-        period: float,
-        count: float,
-        stop: Callable[[TripError, float], None],
-    ) -> None:
+    def __init__(self, velocity_limit: float, period: float, count: float) -> None:
         self._speed, self._floor = _FACTOR * velocity_limit, _FLOOR * count
         self._usual = max(self._speed * period, self._floor)  # rad, from one sample to the next
-        self._stop = stop
+        self._stop: Stop | None = None
         self._x = self._t = math.nan
         self._samples = 0
         self._found: deque[int] = deque(maxlen=_MANY)
@@ -61,6 +51,10 @@ class Outliers:
             return False
         return self._is_off(sample)
 
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+        """Object if there were too many up to this sample."""
+        return self._stop
+
     def _is_off(self, sample: Sample) -> bool:
         moved = abs(sample.position - self._x)
         allowed = max(self._speed * (sample.t - self._t), self._floor)
@@ -72,13 +66,10 @@ class Outliers:
         if len(self._found) < _MANY or self._samples - self._found[0] >= _WITHIN:
             self.count += 1
             return True
-        self._stop(
-            TripError(
-                "jump",
-                f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
-                f"third jump within {_WITHIN} samples.",
-                "Look at the encoder's cable, screen and coupling.",
-            ),
-            sample.t,
+        self._stop = Stop(
+            "jump",
+            f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
+            f"third jump within {_WITHIN} samples.",
+            "Look at the encoder's cable, screen and coupling.",
         )
         return False

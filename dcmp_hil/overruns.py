@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import DeadlineError
+from dcmp_hil.stop import Stop, Urgency
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Timing
@@ -44,7 +44,7 @@ class Overruns:
         self._recent = 0  # a bit a period, the newest last
         self._cold = round(_WARM / period)  # periods to go
 
-    def look(self, timing: Timing) -> DeadlineError | None:
+    def check(self, timing: Timing) -> Stop | None:
         """Take the timing of one period; return why the run should end if too many were late."""
         _, lateness, compute = timing
         punctual = self._punctual + self._leak
@@ -63,11 +63,15 @@ class Overruns:
                 return self._too_many(timing)
         return None
 
-    def _too_many(self, timing: Timing) -> DeadlineError:
+    def _too_many(self, timing: Timing) -> Stop:
         behind = timing.lateness - self._punctual
-        return DeadlineError(
+        return Stop(
+            "deadline",
             f"{self._recent.bit_count()} of the last {_WINDOW} periods of {1e6 * self._period:.0f} us were "
-            f"late; the last sample by {1e6 * behind:.0f} us, its command took {1e6 * timing.compute:.0f} us."
-            " Close other programs, lower loop.rate_hz, see what the summary says was not granted, or set "
-            'timing.overrun = "hold".'
+            f"late; the last sample by {1e6 * behind:.0f} us, its command took "
+            f"{1e6 * timing.compute:.0f} us.",
+            "Close other programs, lower loop.rate_hz, see what the summary says was not granted, or set "
+            'timing.overrun = "hold".',
+            Urgency.RAMP,
+            late=True,
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dcmp_hil.diagnosis import moved_by
-from dcmp_hil.errors import TripError
+from dcmp_hil.stop import Stop
 from dcmp_hil.values import Event, EventKind, ProbeData
 
 if TYPE_CHECKING:
@@ -95,6 +95,10 @@ class Probe:
     ----------
     found
         The motor's gain; None before the probe is over.
+    over
+        Whether it is over, and all is well.
+    voltage
+        V, for the period of the last sample.
     """
 
     def __init__(
@@ -106,7 +110,7 @@ class Probe:
         *,
         gravity: float = 0.0,
     ) -> None:
-        self._ku, self._voltage, self._count, self._gravity = ku, voltage, count, gravity
+        self._ku, self._push, self._count, self._gravity = ku, voltage, count, gravity
         self._began = math.nan  # s, of the present stage
         self._x0 = math.nan  # rad, where the arm was as the stage of watching, and then the pushes, began
         self._seen: list[tuple[float, float, float]] = []  # s and rad since the pushes began, V applied
@@ -115,106 +119,116 @@ class Probe:
         self._length = math.nan  # s, of the first push
         self._rise = 0.0  # s, that the voltage applied takes to get there, and takes to get back
         self._stage = self._watch
+        self.over = False
+        self.voltage = 0.0
 
     @property
     def telling(self) -> bool:
         """Whether the encoder is fine enough for the probe to say anything."""
-        return 0.5 * self._ku * self._voltage * PUSH * PUSH > _TELLING * self._count
+        return 0.5 * self._ku * self._push * PUSH * PUSH > _TELLING * self._count
 
-    def voltage_at(self, sample: Sample) -> float | None:
-        """Return the voltage for this period, V; None when the probe is over and all is well.
+    def check(self, sample: Sample) -> Stop | None:
+        """Take a sample; object if the rig is not what the file says.
 
-        Raises
-        ------
-        TripError
-            ``moving``, ``power``, ``slew``, ``polarity`` or ``gain``: the rig is not what the file says.
+        Reasons are ``moving``, ``power``, ``slew``, ``polarity``, ``gain`` and ``not_finite``.
         """
+        if not math.isfinite(sample.t + sample.position + sample.voltage):
+            return Stop(
+                "not_finite",
+                f"Not every number is finite while the arm is probed: position {sample.position}, voltage "
+                f"{sample.voltage}, t = {sample.t:.3f} s.",
+                "Look at the encoder, and at the class that is the backend.",
+            )
         if math.isnan(self._began):
             self._began, self._x0 = sample.t, sample.position
         return self._stage(sample.t - self._began, sample)
 
-    def _watch(self, since: float, sample: Sample) -> float | None:
+    def _watch(self, since: float, sample: Sample) -> Stop | None:
         moved = sample.position - self._x0
         if not -_REST <= moved <= _REST:
-            raise TripError(
+            return Stop(
                 "moving",
                 f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
                 'Bring it to rest, hanging, and start again; supervisor.probe = "off" starts without it.',
             )
-        if since < WATCH:
-            return 0.0
-        self._began, self._x0 = sample.t, sample.position
-        self._seen = [(0.0, sample.position, 0.0)]
-        self._stage = self._push_up
-        return self._voltage
-
-    def _push_up(self, since: float, sample: Sample) -> float | None:
-        self._seen.append((since, sample.position, sample.voltage))
-        moved = abs(sample.position - self._x0)
-        if not abs(sample.voltage) >= _RISEN * self._voltage:
-            self._rise = since
-        coasting = _COASTS * moved / since * self._rise if since > 0.0 else 0.0
-        if since < PUSH and moved < _FAR and moved + coasting < _COASTED:
-            return self._voltage
-        self._length, self._began = since, sample.t
-        self._stage = self._push_down
-        return -self._voltage
-
-    def _push_down(self, since: float, sample: Sample) -> float | None:
-        self._seen.append((self._length + since, sample.position, sample.voltage))
-        if since < self._length and abs(sample.position - self._x0) < _FARTHEST:
-            return -self._voltage
-        self._judge(np.array(self._seen).T)
-        if self._notify and self.found:
-            self._notify(self.found.told(sample.t))
+        if since >= WATCH:
+            self._began, self._x0 = sample.t, sample.position
+            self._seen = [(0.0, sample.position, 0.0)]
+            self._stage, self.voltage = self._push_up, self._push
         return None
 
-    def _judge(self, seen: NDArray[np.float64]) -> None:
+    def _push_up(self, since: float, sample: Sample) -> Stop | None:
+        self._seen.append((since, sample.position, sample.voltage))
+        moved = abs(sample.position - self._x0)
+        if not abs(sample.voltage) >= _RISEN * self._push:
+            self._rise = since
+        coasting = _COASTS * moved / since * self._rise if since > 0.0 else 0.0
+        if not (since < PUSH and moved < _FAR and moved + coasting < _COASTED):
+            self._length, self._began = since, sample.t
+            self._stage, self.voltage = self._push_down, -self._push
+        return None
+
+    def _push_down(self, since: float, sample: Sample) -> Stop | None:
+        self._seen.append((self._length + since, sample.position, sample.voltage))
+        if since < self._length and abs(sample.position - self._x0) < _FARTHEST:
+            return None
+        stop = self._judge(np.array(self._seen).T)
+        self.over = stop is None
+        if self.over and self._notify and self.found:
+            self._notify(self.found.told(sample.t))
+        return stop
+
+    @np.errstate(all="ignore")  # what overflows is far from any gain, and is refused
+    def _judge(self, seen: NDArray[np.float64]) -> Stop | None:
         """Compare the measured motor gain with the believed one; an encoder's step is given the benefit."""
         moved = seen[1] - self._x0
-        up, farthest = moved[np.searchsorted(seen[0], self._length)], float(np.abs(moved).max())
+        up, farthest = (
+            moved[min(np.searchsorted(seen[0], self._length), len(moved) - 1)],
+            float(np.abs(moved).max()),
+        )
         gain, deviation = self._gain(seen[0], moved, seen[2])
         self.found = MotorGain(gain, deviation, self._ku)
         unsure = _SURE * deviation
-        volts, down = f"{self._voltage:g} V", moved[-1] - up
+        volts, down = f"{self._push:g} V", moved[-1] - up
         said = f"+{volts} moved the arm by {up:+.4f} rad, -{volts} by {down:+.4f} rad"
         unclear = not gain - unsure > 0.0 and gain + unsure > 0.0
-        if not farthest > self._count or unclear:
-            self._refuse_slow(float(np.abs(seen[2]).max()))
+        reached = float(np.abs(seen[2]).max())
+        if (not farthest > self._count or unclear) and not reached >= _REACHED * self._push:
+            return self._too_slow(reached)
         if not farthest > self._count:
-            raise TripError(
+            return Stop(
                 "power",
                 f"The arm does not answer: {said}.",
                 "Look at motor supply, e-stop and ENABLE, at the coupling, and at the encoder's cable.",
             )
         if not gain + unsure > 0.0:
-            raise TripError(
+            return Stop(
                 "polarity",
                 f"The arm goes the wrong way: {said}.",
                 "Change amplifier.sign, or encoder.sign if the count falls when you lift the arm by hand.",
             )
         if not gain - unsure > 0.0:
-            raise TripError(
+            return Stop(
                 "power",
                 f"The arm hardly answers, too little to tell which way: {said}.",
                 'Look what holds it, and at the motor supply; supervisor.probe = "off" starts without.',
             )
         if not (gain + unsure > self._ku / _SPREAD and gain - unsure < self._ku * _SPREAD):
-            raise TripError(
+            return Stop(
                 "gain",
                 f"The arm answers {gain / self._ku:.2g} times as strongly as [model] says: {said}.",
                 "Look at encoder.counts_per_rev (after quadrature), at the gear, and at model.ku_rad_s2_V.",
             )
+        return None
 
-    def _refuse_slow(self, reached: float) -> None:
-        """Find the fault with the amplifier, where it put out too little for the arm to answer."""
-        if not reached >= _REACHED * self._voltage:
-            raise TripError(
-                "slew",
-                f"The amplifier put out {reached:.2g} V of the {self._voltage:g} V asked for in "
-                f"{self._length:.2g} s, too little to move the arm.",
-                "Look at the slew limit of the device and at amplifier.slew_V_s: 20 V/s and more would do.",
-            )
+    def _too_slow(self, reached: float) -> Stop:
+        """Find the fault with the amplifier: it put out too little for the arm to answer."""
+        return Stop(
+            "slew",
+            f"The amplifier put out {reached:.2g} V of the {self._push:g} V asked for in "
+            f"{self._length:.2g} s, too little to move the arm.",
+            "Look at the slew limit of the device and at amplifier.slew_V_s: 20 V/s and more would do.",
+        )
 
     def _gain(
         self, t: NDArray[np.float64], moved: NDArray[np.float64], applied: NDArray[np.float64]

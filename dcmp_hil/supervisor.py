@@ -6,15 +6,15 @@ import math
 from enum import Enum, StrEnum, auto
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Event, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dcmp_hil.limits import Limits
-    from dcmp_hil.monitors import Monitor
     from dcmp_hil.probe import MotorGain, Probe
+    from dcmp_hil.stop import Check
     from dcmp_hil.values import Estimate, Sample
 
 
@@ -38,8 +38,8 @@ class Cue(Enum):
     PROBED = auto()
     SETTLED = auto()
     ENGAGED = auto()
-    FAULT = auto()  # a monitor objects, the probe refuses, or the device reports a fault
-    CONCERN = auto()  # something that leaves time for an orderly end
+    FAULT = auto()  # a check that objects with Urgency.NOW
+    CONCERN = auto()  # one that leaves time for an orderly end: Urgency.RAMP
     STOPPED = auto()
 
 
@@ -67,10 +67,10 @@ class Supervisor:
 
     Parameters
     ----------
-    monitors
-        Checked every period, in this order; an objection means 0 V at once.
+    checks
+        Asked every period, in this order; the first objection is the cause.
     limits
-        Clamps on what the line asks for.
+        Clamps on what the line asks for, and the check of them.
     settle, engage
         s, the lengths of these two phases; 0 and 0 for an immediate start.
     notify
@@ -87,14 +87,12 @@ class Supervisor:
     phase
         Where the run stands.
     stopping
-        Whether an orderly end is under way: some periods more, and there will be a `trip`.
-    trip
-        Why the run is over; None while it is not.
+        Whether an orderly end is under way: in a few periods `check` says that the run is over.
     """
 
     def __init__(
         self,
-        monitors: Sequence[Monitor],
+        checks: Sequence[Check],
         limits: Limits,
         *,
         settle: float,
@@ -102,8 +100,9 @@ class Supervisor:
         notify: Callable[[Event], None],
         probe: Probe | None = None,
     ) -> None:
-        self._checks = tuple(monitor.check for monitor in monitors)
+        self._checks = tuple(one.check for one in checks)
         self.limits = limits
+        self._check_limits, self._limited = limits.check, limits.voltage
         self.bound = limits.reference
         self._settle, self._engage = settle, engage
         self._notify = notify
@@ -112,11 +111,11 @@ class Supervisor:
         self._push = 0.0  # V, what the probe wants
         self._last = 0.0  # V, what was sent last
         self._stop_from = 0.0  # V, where an orderly end begins
-        self._cause: DcmpError | None = None
+        self._cause: Stop | None = None
+        self._over: Stop | None = None
         self._has_authority = False  # in RUNNING; asked every period
         self.phase = Phase.ARMING
         self.stopping = False
-        self.trip: DcmpError | None = None
 
     @property
     def motor_gain(self) -> MotorGain | None:
@@ -139,49 +138,59 @@ class Supervisor:
     def admit(self, sample: Sample, estimate: Estimate, demand: float) -> float:
         """Return the voltage to send, V.
 
-        Once a monitor has objected, the probe has refused, or the demand was no finite number, it is 0 V for
-        good, and `trip` says why: the loop sends that 0 V, records the period, and ends. A limit that has
-        acted for too long takes 50 ms to get there.
+        Once a check has objected with `Urgency.NOW`, or the demand was no finite number, it is 0 V for good,
+        and `check` says why: the loop sends that 0 V, records the period, and ends. After an objection with
+        `Urgency.RAMP`, such as that of a limit that has acted for too long, it takes 50 ms to get there.
         """
+        for check in self._checks:
+            objection = check(sample, estimate)
+            if objection is not None:
+                self.stop(objection, sample.t)
+                break
         try:
-            for check in self._checks:
-                check(sample, estimate)
-            _check_finite(sample, demand)
-        except TripError as objection:
-            self.stop_now(objection, sample.t)
+            if not -math.inf < demand < math.inf:
+                self.stop(_not_finite(sample, demand), sample.t)
+        except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
+            raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
         if not self._has_authority:
             self._end_ramp(sample.t)
         self._last = voltage = (
-            self.limits.voltage(sample.t, demand, self._last)
+            self._limited(sample.t, demand, self._last)
             if self._has_authority
             else self._partial_voltage(sample.t, demand)
         )
-        if self.limits.concern is not None:
-            self.stop_orderly(self.limits.concern, sample.t)
+        objection = self._check_limits(sample, estimate)
+        if objection is not None:
+            self.stop(objection, sample.t)
+            if self._over is not None:  # without authority there is nothing to lead to 0 V
+                self._last = voltage = 0.0
         return voltage
 
-    def stop_now(self, cause: TripError, t: float) -> None:
-        """Go to 0 V in the period of device time `t`, s."""
-        self._cause = self._cause or cause  # the first cause wins
-        self._cue(Cue.FAULT, t)
+    def check(self, t: float, late: Stop | None) -> Stop | None:
+        """Return why the run is over, None if it is not; then take what was wrong with the period's timing.
 
-    def stop_orderly(self, cause: DcmpError, t: float) -> None:
-        """Let authority shrink to 0 V from the period after device time `t` (s) on, then trip."""
+        In that order: the loop has sent 0 V before it ends.
+        """
+        over = self._over
+        if late is not None:
+            self.stop(late, t)
+        return over
+
+    def stop(self, cause: Stop, t: float) -> None:
+        """Begin to end the run in the period of device time `t` (s); the first cause wins."""
         self._cause = self._cause or cause
-        self._cue(Cue.CONCERN, t)
+        self._cue(Cue.FAULT if cause.urgency is Urgency.NOW else Cue.CONCERN, t)
 
     def _go_on_probing(self, sample: Sample) -> None:
         assert self._probe is not None  # noqa: S101 - the table leads here only with one
-        try:
-            push = self._probe.voltage_at(sample)
-        except TripError as refusal:
-            self.stop_now(refusal, sample.t)
-            return
-        if push is None:
+        refusal = self._probe.check(sample)
+        if refusal is not None:
+            self.stop(refusal, sample.t)
+        elif self._probe.over:
             self._cue(Cue.PROBED, sample.t)
         else:
             most = self.limits.voltage_limit
-            self._push = max(-most, min(most, push))
+            self._push = max(-most, min(most, self._probe.voltage))
 
     def _end_ramp(self, t: float) -> None:
         """Leave ENGAGING with full authority, STOPPING with none."""
@@ -211,21 +220,14 @@ class Supervisor:
         self.phase, self._since = following, t
         self._has_authority = following is Phase.RUNNING
         self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
-        if following is Phase.TRIPPED:
-            self.trip = self._cause
-            if cue is Cue.STOPPED and isinstance(self._cause, TripError):
-                self._cause.orderly = True
+        if following is Phase.TRIPPED and self._cause is not None:
+            self._over = self._cause._replace(orderly=cue is Cue.STOPPED)
         self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
 
 
-def _check_finite(sample: Sample, demand: float) -> None:
-    try:
-        finite = -math.inf < demand < math.inf
-    except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
-        raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
-    if not finite:
-        raise TripError(
-            "not_finite",
-            f"The controller asked for {demand} V at t = {sample.t:.3f} s.",
-            "Look for a division by zero or a missing value in the controller.",
-        )
+def _not_finite(sample: Sample, demand: float) -> Stop:
+    return Stop(
+        "not_finite",
+        f"The controller asked for {demand} V at t = {sample.t:.3f} s.",
+        "Look for a division by zero or a missing value in the controller.",
+    )

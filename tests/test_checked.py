@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil import BackendError, Estimate, Sample, TripError, Truth, run
-from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver, failure_of
 from dcmp_hil.plugins.checked_backend import CheckedBackend
 from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.values import Reference
@@ -193,7 +193,7 @@ def test_numbers_of_other_kinds_become_plain_ones(number: Any) -> None:
     checked = CheckedObserver(own, "mine:Own")
     assert checked.update(Sample(0.0, 0.0, 0.0)) == (voltage, voltage, voltage)
     assert {type(value) for value in checked.update(Sample(0.0, 0.0, 0.0))} == {float}
-    assert checked.trip is None
+    assert failure_of(checked) is None
 
 
 @pytest.mark.parametrize("value", NO_NUMBER.values(), ids=NO_NUMBER)

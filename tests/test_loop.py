@@ -13,6 +13,7 @@ from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import TripError
 from dcmp_hil.outliers import Outliers
 from dcmp_hil.overruns import Overruns
+from dcmp_hil.stop import Stop
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench
 
@@ -26,7 +27,7 @@ class _Stages:
     def __init__(self, clock: SimulatedClock, samples: list[Sample]) -> None:
         self.calls: list[tuple[str, tuple[Any, ...]]] = []
         self.clock = clock
-        self.trip: TripError | None = None
+        self.over: Stop | None = None
         self.trip_at = 10**9
         self._samples = iter(samples)
         self._tick = -1
@@ -36,7 +37,6 @@ class _Stages:
         calls = self.calls
 
         class Stage:
-            trip = property(lambda _: self.trip)
             stopping = False
 
             def __getattr__(self, name: str) -> Callable[..., Any]:
@@ -55,7 +55,7 @@ class _Stages:
 
     def admit(self, *_: object) -> float:
         if self._tick >= self.trip_at:
-            self.trip = TripError("because", "Seen.", "Look.")
+            self.over = Stop("because", "Seen.", "Look.")
             return 0.0
         return 6.0
 
@@ -69,7 +69,7 @@ class _Stages:
 
         return loop.Line(
             backend=self.stage({"read": self.read, "write": lambda _: None}),
-            outliers=Outliers(math.inf, 1e-3, 0.0, lambda _, __: None),
+            outliers=Outliers(math.inf, 1e-3, 0.0),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
             predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
             trajectory=self.stage(
@@ -81,6 +81,7 @@ class _Stages:
                     "engages": lambda _: self._tick == 1,
                     "bound": lambda _, reference: reference,
                     "admit": self.admit,
+                    "check": lambda _, __: self.over,
                 }
             ),
             telemetry=self.stage({"record": lambda _: None}),
@@ -106,12 +107,11 @@ def _stages(trip_at: int = 10**9) -> tuple[_Stages, loop.Line]:
 def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     stages, line = _stages()
     assert loop.run(line, _SAMPLES[1].t, _Stop()) == _SAMPLES[1].t
-    second = stages.calls[len(stages.calls) // 2 :]  # begin comes in the second period only
-    second = stages.calls[[name for name, _ in stages.calls].index("record") + 1 :]
+    second = stages.calls[[name for name, _ in stages.calls].index("check") + 1 :]  # which has "begin"
     names = [name for name, _ in second]
     assert names == [
         "read", "update", "engages", "begin", "ahead", "at", "bound", "update", "admit", "write", "sent",
-        "record",
+        "record", "check",
     ]  # fmt: skip
     given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
     sample, estimate = _SAMPLES[1], Estimate(0.25, 0.0, 0.0)
@@ -149,9 +149,9 @@ def test_loop_writes_zero_and_records_the_period_before_it_raises_a_trip() -> No
     stages, line = _stages(trip_at=2)
     with pytest.raises(TripError, match="Seen"):
         loop.run(line, _SAMPLES[2].t, _Stop())  # tripping wins over the end
-    assert [name for name, _ in stages.calls][-3:] == ["write", "sent", "record"]
-    assert stages.calls[-3] == ("write", (0.0,))
-    assert stages.calls[-1][1][0].voltage == 0.0
+    assert [name for name, _ in stages.calls][-4:] == ["write", "sent", "record", "check"]
+    assert stages.calls[-4] == ("write", (0.0,))
+    assert stages.calls[-2][1][0].voltage == 0.0
 
 
 @pytest.mark.parametrize("delay", [0, 1])

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.assembly import make_supervisor
 from dcmp_hil.errors import TripError
-from dcmp_hil.monitors import DisturbanceWatch, Finite, Monitor, Ranges
+from dcmp_hil.monitors import DisturbanceWatch, Finite, Ranges
 from dcmp_hil.values import Estimate, Fault, Sample
 from tests.helpers import T, bench, setting, spoilt
+
+if TYPE_CHECKING:
+    from dcmp_hil.stop import Check
 
 _SAMPLE, _ESTIMATE = Sample(1.0, 0.1, 2.0), Estimate(0.1, 0.5, -3.0)
 _NOT_FINITE = [math.nan, math.inf, -math.inf]
 
 
-def _reason(monitor: Monitor, sample: Sample = _SAMPLE, estimate: Estimate = _ESTIMATE) -> str:
+def _reason(monitor: Check, sample: Sample = _SAMPLE, estimate: Estimate = _ESTIMATE) -> str:
     """Return why the monitor objects; empty if it does not."""
-    try:
-        monitor.check(sample, estimate)
-    except TripError as trip:
-        return trip.explained().reason
-    return ""
+    stop = monitor.check(sample, estimate)
+    if stop is None:
+        return ""
+    trip = stop.error()
+    assert isinstance(trip, TripError)
+    return trip.explained().reason
 
 
 class _Finds:
@@ -135,8 +140,9 @@ def test_the_rigs_monitors_trip_in_the_same_period_when_anything_is_not_finite(
     else:
         sample = spoilt(sample, field, bad)
     assert supervisor.admit(sample, estimate, 1.0) == 0.0
-    assert isinstance(supervisor.trip, TripError)
-    assert supervisor.trip.reason == "not_finite"
+    over = supervisor.check(sample.t, None)
+    assert over is not None
+    assert (over.reason, over.orderly) == ("not_finite", False)
 
 
 @pytest.mark.parametrize(
@@ -152,4 +158,4 @@ def test_the_rigs_limits_reach_the_monitors(
     for overrides, expected in (((f"supervisor.{key}",), reason), ((), None)):
         supervisor = make_supervisor(bench(*overrides), lambda _: None)
         supervisor.admit(sample, estimate, 0.0)
-        assert getattr(supervisor.trip, "reason", None) == expected
+        assert getattr(supervisor.check(0.0, None), "reason", None) == expected

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.outliers import Outliers
-from dcmp_hil.values import Sample
+from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T
-
-if TYPE_CHECKING:
-    from dcmp_hil.errors import TripError
 
 COUNT = math.tau / 4096
 SPEED = 20.0  # rad/s: four times that is 0.08 rad a period
@@ -20,8 +17,11 @@ SPEED = 20.0  # rad/s: four times that is 0.08 rad a period
 
 class _Bench:
     def __init__(self, speed: float = SPEED) -> None:
-        self.found: list[tuple[TripError, float]] = []
-        self.outliers = Outliers(speed, T, COUNT, lambda trip, t: self.found.append((trip, t)))
+        self.outliers = Outliers(speed, T, COUNT)
+
+    @property
+    def stop(self) -> Stop | None:
+        return self.outliers.check(Sample(0.0, 0.0, 0.0), Estimate(0.0, 0.0, 0.0))
 
     def rejected(self, *positions: float, step: float = T, begin: float = 0.0) -> list[bool]:
         """Show positions a period apart."""
@@ -36,7 +36,7 @@ def test_outliers_leave_one_wrong_count_out(jump: float) -> None:
     bench = _Bench()
     assert bench.rejected(1.0, 1.0, 1.0 + jump, 1.0, 1.0) == [False, False, True, False, False]
     assert bench.outliers.count == 1
-    assert not bench.found
+    assert bench.stop is None
 
 
 def test_outliers_are_not_how_fast_an_arm_can_turn() -> None:
@@ -60,15 +60,15 @@ def test_third_outlier_within_a_hundred_samples_ends_the_run() -> None:
         bench = _Bench()
         seen = bench.rejected(0.0, 1.0, 0.0, 1.0, *[0.0] * between, 1.0)
         assert seen.count(True) == (2 if ends else 3)
-        assert [trip.reason for trip, _ in bench.found] == ["jump"] * ends
+        assert (bench.stop is not None and bench.stop.reason == "jump") == ends
 
 
 def test_jump_that_stays_ends_the_run_with_its_third_sample() -> None:
     bench = _Bench()
     assert bench.rejected(0.0, 1.0, 1.0, 1.0) == [False, True, True, False]
-    ((trip, t),) = bench.found
-    assert trip.reason == "jump"
-    assert t == 3 * T
+    assert bench.stop is not None
+    assert (bench.stop.reason, bench.stop.urgency) == ("jump", Urgency.NOW)
+    assert "t = 0.003 s" in bench.stop.sentence
 
 
 @pytest.mark.parametrize("position", [math.nan, math.inf, -math.inf])

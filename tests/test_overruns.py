@@ -11,6 +11,7 @@ import pytest
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DeadlineError
 from dcmp_hil.overruns import Overruns
+from dcmp_hil.stop import Urgency
 from dcmp_hil.values import Timing
 from sim_backend.backend import SimBackend
 from tests.helpers import HeldRun, T, bench
@@ -28,13 +29,13 @@ def _warm(limit: int | None = None) -> Overruns:
     """Return one that has seen its first 0.1 s."""
     overruns = Overruns(T, limit)
     for _ in range(100):
-        overruns.look(_ON_TIME)
+        overruns.check(_ON_TIME)
     return overruns
 
 
 def test_overruns_count_nothing_when_every_period_is_on_time() -> None:
     overruns = _warm(1)
-    overruns.look(Timing(math.nan, 0.49 * T, T))
+    overruns.check(Timing(math.nan, 0.49 * T, T))
     assert overruns.count == 0
 
 
@@ -42,35 +43,36 @@ def test_overruns_count_nothing_when_every_period_is_on_time() -> None:
 def test_overruns_end_the_run_at_their_limit_of_twenty(timing: Timing) -> None:
     overruns = _warm(5)
     for _ in range(4):  # every fifth: the fourth of twenty
-        overruns.look(timing)
+        overruns.check(timing)
         for _ in range(4):
-            overruns.look(_ON_TIME)
+            overruns.check(_ON_TIME)
     for _ in range(20):  # one leaves the window as the next comes
-        overruns.look(timing)
+        overruns.check(timing)
         for _ in range(4):
-            overruns.look(_ON_TIME)
-    overruns.look(timing)
+            overruns.check(_ON_TIME)
+    overruns.check(timing)
     assert overruns.count == 25
-    concern = overruns.look(timing)
+    concern = overruns.check(timing)
     assert concern is not None
-    assert concern.exit_code == 5
-    assert "5 of the last 20 periods of 1000 us were late" in str(concern)
-    assert "timing.overrun" in str(concern)
+    assert concern.urgency is Urgency.RAMP
+    assert isinstance(concern.error(), DeadlineError)
+    assert "5 of the last 20 periods of 1000 us were late" in str(concern.error())
+    assert "timing.overrun" in str(concern.error())
 
 
 def test_overruns_end_nothing_while_everything_is_cold() -> None:
     overruns = Overruns(T, 1)
     for _ in range(100):
-        overruns.look(_SLOW)
-    overruns.look(_ON_TIME)
+        overruns.check(_SLOW)
+    overruns.check(_ON_TIME)
     assert overruns.count == 100
-    assert overruns.look(_SLOW) is not None
+    assert overruns.check(_SLOW) is not None
 
 
 def test_overruns_only_count_when_there_is_no_limit() -> None:
     overruns = Overruns(T)
     for _ in range(1000):
-        overruns.look(_SLOW)
+        overruns.check(_SLOW)
     assert overruns.count == 1000
 
 
@@ -78,14 +80,14 @@ def test_overruns_only_count_when_there_is_no_limit() -> None:
 def test_overruns_forgive_a_device_whose_clock_is_off(ppm: float) -> None:
     overruns = Overruns(T, 1)
     for k in range(100_000):
-        overruns.look(Timing(T, 1e-6 * ppm * k * T, 20e-6))
+        overruns.check(Timing(T, 1e-6 * ppm * k * T, 20e-6))
     assert overruns.count == 0
 
 
 def test_overruns_see_lateness_when_the_first_sample_was_late_itself() -> None:
     overruns = _warm(1)
-    overruns.look(Timing(T, -0.8 * T, 20e-6))
-    assert overruns.look(Timing(T, 0.0, 20e-6)) is not None
+    overruns.check(Timing(T, -0.8 * T, 20e-6))
+    assert overruns.check(Timing(T, 0.0, 20e-6)) is not None
 
 
 class _Busy(SimBackend):
@@ -109,7 +111,7 @@ def test_run_ends_at_zero_volts_when_periods_are_late_and_the_rig_says_stop() ->
     assert held.reads == 108  # one more: the supervisor's 0 V, as the arm is at rest yet
     assert not held.backend.live
     result = held.session.result()
-    assert result.overruns == 7
+    assert result.overruns == 8  # that one was late as well
     assert result.summary.periods == 108
     assert [event.level for event in result.events[-2:]] == ["ERROR", "INFO"]
     assert result.events[-1].text == "amplifier at 0 V"

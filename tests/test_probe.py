@@ -31,9 +31,12 @@ def probe(
     applied = 0.0
     for k in range(2000):
         seen = count * round(x / count) if count else x
-        voltage = made.voltage_at(Sample(k * T, seen, applied))
-        if voltage is None:
+        stop = made.check(Sample(k * T, seen, applied))
+        if stop is not None:
+            raise stop.error()
+        if made.over:
             return farthest, sent
+        voltage = made.voltage
         sent.append(voltage)
         applied = voltage = max(applied - slew * T, min(applied + slew * T, voltage))
         v += T * (gain * KU * voltage + drift)
@@ -79,9 +82,8 @@ def test_probe_refuses_an_arm_that_moves_by_itself(drift: float) -> None:
 
 def test_probe_refuses_nan() -> None:
     made = Probe(KU, 1.0, 0.0)
-    made.voltage_at(Sample(0.0, 0.0, 0.0))
-    with pytest.raises(TripError):
-        made.voltage_at(Sample(T, math.nan, 0.0))
+    assert made.check(Sample(0.0, 0.0, 0.0)) is None
+    assert made.check(Sample(T, math.nan, 0.0)) is not None
 
 
 @pytest.mark.parametrize(("counts", "telling"), [(4096, True), (1000, True), (16, False)])

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.errors import TripError
 from dcmp_hil.limits import Limits
+from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.supervisor import Phase, Supervisor
 from dcmp_hil.values import Estimate, Event, EventKind, Reference, Sample
 
-_AT_REST = Estimate(0.0, 0.0, 0.0)
+_ANY, _AT_REST = Sample(0.0, 0.0, 0.0), Estimate(0.0, 0.0, 0.0)
 _PERIOD = 1.0 / 1024.0  # s, exact in binary: phases change at the very period
 
 
@@ -21,9 +21,8 @@ class _Objects:
     def __init__(self, at: float, reason: str = "because") -> None:
         self.at, self._reason = at, reason
 
-    def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002
-        if sample.t >= self.at:
-            raise TripError(self._reason, "Seen.", "Look.")
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002
+        return Stop(self._reason, "Seen.", "Look.") if sample.t >= self.at else None
 
 
 def _supervisor(
@@ -40,8 +39,9 @@ def _supervisor(
 
 
 def _reason(supervisor: Supervisor) -> str:
-    assert isinstance(supervisor.trip, TripError)
-    return supervisor.trip.reason
+    over = supervisor.check(math.inf, None)
+    assert over is not None
+    return over.reason
 
 
 def _period(supervisor: Supervisor, t: float, demand: float) -> tuple[bool, float]:
@@ -132,7 +132,7 @@ def test_supervisor_stays_at_zero_volts_once_a_monitor_objected() -> None:
     assert _period(supervisor, 1.0, 3.0)[1] == 0.0
     monitor.at = math.inf  # the fault is gone
     assert _period(supervisor, 1.1, 3.0)[1] == 0.0
-    assert supervisor.trip is not None
+    assert supervisor.check(math.inf, None) is not None
 
 
 def test_supervisor_keeps_the_first_cause() -> None:
@@ -154,13 +154,13 @@ def test_supervisor_trips_while_it_settles_too() -> None:
     supervisor, _ = _supervisor(_Objects(0.1))
     for t in (0.0, 0.1):
         _period(supervisor, t, 0.0)
-    assert supervisor.trip is not None
+    assert supervisor.check(math.inf, None) is not None
 
 
 def _reasons_of(supervisor: Supervisor, demand: float, seconds: float) -> list[tuple[float, float]]:
     """Run periods until it trips; return device times and voltages."""
     seen: list[tuple[float, float]] = []
-    while supervisor.trip is None and len(seen) < seconds / _PERIOD:
+    while supervisor.check(0.0, None) is None and len(seen) < seconds / _PERIOD:
         t = len(seen) * _PERIOD
         seen.append((t, _period(supervisor, t, demand)[1]))
     return seen
@@ -191,7 +191,7 @@ def test_supervisor_goes_to_zero_at_once_when_a_fault_comes_into_an_orderly_end(
 def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: float) -> None:
     supervisor, _ = _supervisor(settle=0.0, engage=0.0)
     assert _period(supervisor, 0.0, -6.0)[1] == -6.0
-    supervisor.stop_orderly(TripError("late", "Seen.", "Look."), 0.0)
+    assert supervisor.check(0.0, Stop("late", "Seen.", "Look.", Urgency.RAMP)) is None  # 0 V is sent first
     assert supervisor.stopping
     for k in range(1, 60):
         most = 6.0 * max(0.0, 1.0 - (k * _PERIOD) / 0.05)
@@ -203,7 +203,7 @@ def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: fl
 def test_supervisor_trips_at_once_when_an_orderly_end_is_asked_for_without_authority() -> None:
     supervisor, _ = _supervisor()
     _period(supervisor, 0.0, 1.0)
-    supervisor.stop_orderly(TripError("late", "Seen.", "Look."), 0.0)
+    assert supervisor.check(0.0, Stop("late", "Seen.", "Look.", Urgency.RAMP)) is None  # 0 V is sent first
     assert _reason(supervisor) == "late"
 
 
@@ -252,8 +252,9 @@ def test_limits_want_an_end_when_the_arm_stays_off_the_reference() -> None:
     for k in range(200):  # less than half a second, again and again
         for late in range(100):
             _bound(limits, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)
-    assert not limits.concern
+    assert limits.check(_ANY, _AT_REST) is None
     for late in range(513):
         _bound(limits, Reference(-0.6, 0.0, 0.0), t=1e3 + late * _PERIOD)
-    assert limits.concern is not None
-    assert limits.concern.reason == "tracking"
+    stop = limits.check(_ANY, _AT_REST)
+    assert stop is not None
+    assert (stop.reason, stop.urgency) == ("tracking", Urgency.RAMP)

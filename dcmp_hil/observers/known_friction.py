@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.errors import TripError
     from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.stop import Stop
     from dcmp_hil.values import Estimate, Reference, Sample
 
 _CROSSING_RAD_S = 0.005  # the sign is a ramp inside it, so that the voltage stays continuous
@@ -53,11 +53,10 @@ class KnownFriction:
         rest = self._observer.update(sample._replace(voltage=sample.voltage + held * self._volts))
         return rest._replace(disturbance=rest.disturbance + self._friction(sample.t + self._ahead))
 
-    @property
-    def trip(self) -> TripError | None:
-        """Why an observer of the user's own failed; None while it has not."""
-        found: TripError | None = getattr(self._observer, "trip", None)
-        return found
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+        """Object if an observer of the user's own has failed."""
+        check: Callable[[Sample, Estimate], Stop | None] | None = getattr(self._observer, "check", None)
+        return check(sample, estimate) if check else None
 
     def retune(self, tuning: Tuning) -> None:
         """Retune the observer that finds the rest."""

@@ -1,53 +1,26 @@
 """Stages of the user's own, with what they return checked once a period.
 
-An observer or a controller that raises, or returns what it may not, goes on as NaN, and its `trip` names
-class, file and line: the supervisor finds it in the same period and sends 0 V.
+An observer or a controller that raises, or returns what it may not, goes on as NaN, and its `check` names
+class, file and line: the supervisor asks it in the same period and sends 0 V.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.errors import DcmpError
 from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
-from dcmp_hil.values import Estimate
+from dcmp_hil.stop import Stop
+from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from dcmp_hil.values import Reference, Sample
+    from dcmp_hil.values import Reference
 
 _NO_ESTIMATE = Estimate(math.nan, math.nan, math.nan)
-
-
-class Failing(Protocol):
-    """A stage that may fail and says why."""
-
-    @property
-    def trip(self) -> TripError | None:
-        """Why it failed first; None while it has not."""
-        ...
-
-
-class FailureMonitor:
-    """No stage of the user's own has failed.
-
-    Parameters
-    ----------
-    stages
-        In the order in which a sample passes them: the first that failed is the cause.
-    """
-
-    def __init__(self, stages: Sequence[Failing]) -> None:
-        self._stages = tuple(stages)
-
-    def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002 - as every monitor
-        """Raise TripError if one has."""
-        for stage in self._stages:
-            if stage.trip is not None:
-                raise stage.trip
 
 
 class CheckedObserver:
@@ -64,14 +37,12 @@ class CheckedObserver:
     ----------
     inner
         As given.
-    trip
-        Why it failed first; None while it has not.
     """
 
     def __init__(self, inner: Any, name: str) -> None:
         self.inner, self._name = inner, name
         self._update: Callable[[Sample], Estimate] = inner.update
-        self.trip: TripError | None = None
+        self._failure: Stop | None = None
 
     def update(self, sample: Sample) -> Estimate:
         """Return the estimate at `sample.t`; NaN if the observer raises, or returns none of numbers."""
@@ -80,13 +51,17 @@ class CheckedObserver:
         except DcmpError:
             raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
-            self.trip = self.trip or _raised(self._name, self._update, error, sample.t)
+            self._failure = self._failure or _raised(self._name, self._update, error, sample.t)
             return _NO_ESTIMATE
         if type(estimate) is Estimate:
             x1, x2, w = estimate
             if type(x1) is type(x2) is type(w) is float and -math.inf < x1 + x2 + w < math.inf:
                 return estimate
         return self._converted(estimate, sample.t)
+
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+        """Object if it has failed, for the reason for which it failed first."""
+        return self._failure
 
     def _converted(self, estimate: Any, t: float) -> Estimate:
         """Take numbers that are no plain floats, such as numpy's; say what else it is."""
@@ -96,9 +71,9 @@ class CheckedObserver:
             if len(numbers) == len(estimate):
                 made = Estimate(*numbers)
                 if not all(math.isfinite(number) for number in numbers):
-                    self.trip = self.trip or _not_finite(self._name, self._update, made, t)
+                    self._failure = self._failure or _not_finite(self._name, self._update, made, t)
                 return made
-        self.trip = self.trip or _wrong(self._name, self._update, estimate, expected, t)
+        self._failure = self._failure or _wrong(self._name, self._update, estimate, expected, t)
         return _NO_ESTIMATE
 
 
@@ -116,14 +91,12 @@ class CheckedController:
     ----------
     inner
         As given.
-    trip
-        Why it failed first; None while it has not.
     """
 
     def __init__(self, inner: Any, name: str) -> None:
         self.inner, self._name = inner, name
         self._update: Callable[[Reference, Estimate], float] = inner.update
-        self.trip: TripError | None = None
+        self._failure: Stop | None = None
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
         """Return the voltage to ask for, V; NaN if the controller raises, or returns no number."""
@@ -132,36 +105,46 @@ class CheckedController:
         except DcmpError:
             raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
-            self.trip = self.trip or _raised(self._name, self._update, error)
+            self._failure = self._failure or _raised(self._name, self._update, error)
             return math.nan
         if type(voltage) is float and -math.inf < voltage < math.inf:
             return voltage
         number = plain_number(voltage)
         if number is None:
-            self.trip = self.trip or _wrong(self._name, self._update, voltage, "a voltage, one number")
+            expected = "a voltage, one number"
+            self._failure = self._failure or _wrong(self._name, self._update, voltage, expected)
             return math.nan
         if not math.isfinite(number):
-            self.trip = self.trip or _not_finite(self._name, self._update, number)
+            self._failure = self._failure or _not_finite(self._name, self._update, number)
         return number
 
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+        """Object if it has failed, for the reason for which it failed first."""
+        return self._failure
 
-def _raised(name: str, method: Callable[..., Any], error: BaseException, t: float | None = None) -> TripError:
+
+def failure_of(stage: object) -> Stop | None:
+    """Return why a stage failed, where it is one of the user's own; None while it has not."""
+    check: Callable[[Sample, Estimate], Stop | None] | None = getattr(stage, "check", None)
+    return check(Sample(math.nan, math.nan, math.nan), _NO_ESTIMATE) if check else None
+
+
+def _raised(name: str, method: Callable[..., Any], error: BaseException, t: float | None = None) -> Stop:
     where = place_of(error, file_of(method)) or place_of_code(method)
-    trip = TripError("plugin", f"{name} raised {message_of(error)}{at(where)}{_when(t)}.", REMEDY)
-    trip.__cause__ = error  # for Python, which shows the traceback
-    return trip
+    sentence = f"{name} raised {message_of(error)}{at(where)}{_when(t)}."
+    return Stop("plugin", sentence, REMEDY, cause=error)  # for Python, which shows the traceback
 
 
 def _wrong(
     name: str, method: Callable[..., Any], value: object, expected: str, t: float | None = None
-) -> TripError:
+) -> Stop:
     where = at(place_of_code(method))
     sentence = f"{name}.update returned {shown_value(value)}{where}{_when(t)}; expected {expected}."
-    return TripError("plugin", sentence, REMEDY)
+    return Stop("plugin", sentence, REMEDY)
 
 
-def _not_finite(name: str, method: Callable[..., Any], value: object, t: float | None = None) -> TripError:
-    return TripError(
+def _not_finite(name: str, method: Callable[..., Any], value: object, t: float | None = None) -> Stop:
+    return Stop(
         "not_finite",
         f"{name}.update returned {shown_value(value)}{at(place_of_code(method))}{_when(t)}.",
         "Look for a division by zero, a missing value, or a gain that makes it diverge.",

@@ -12,6 +12,7 @@ from dcmp_hil.assembly import make_controller, make_observer
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.live.mailbox import Mailbox
+from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.telemetry.ring import FIELDS
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.errors import TripError
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.values import Estimate, Event
 
@@ -94,9 +94,9 @@ def _check_own(again: Again, *stages: object) -> None:
     """Refuse what a class of the user's own failed at, unless the recorded run ended there."""
     failed = np.isnan(again.demand) | np.isnan(again.estimate).any(axis=1)
     for stage in stages:
-        trip: TripError | None = getattr(stage, "trip", None)
-        if trip is not None and trip.reason == "plugin" and failed[:-1].any():
-            raise ConfigError(f"period {int(np.argmax(failed)) + 1}: {trip}") from trip.__cause__
+        failure = failure_of(stage)
+        if failure is not None and failure.reason == "plugin" and failed[:-1].any():
+            raise ConfigError(f"period {int(np.argmax(failed)) + 1}: {failure.error()}") from failure.cause
 
 
 def _nobody(_: Event) -> None:

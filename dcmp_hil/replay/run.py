@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
 from dcmp_hil.replay.plausibility import check_assumed, check_estimates, check_motion
 from dcmp_hil.replay.preparation import prepare
@@ -137,9 +138,9 @@ def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64],
         rows[k] = observer.update(Sample(t, position, applied))
     away = np.flatnonzero(~(np.abs(rows) < _RUNAWAY).all(axis=1))
     if len(away):
-        trip: TripError | None = getattr(observer, "trip", None)
-        if trip is not None and trip.reason == "plugin":
-            raise ConfigError(f"{recording.name}, row {away[0] + 1}: {trip}") from trip.__cause__
+        failure = failure_of(observer)
+        if failure is not None and failure.reason == "plugin":
+            raise ConfigError(f"{recording.name}, row {away[0] + 1}: {failure.error()}") from failure.cause
         raise ConfigError(
             f"{recording.name}: the observer runs away at row {away[0] + 1}. Check the units and the inertia "
             "(or ku), or write smaller gains."

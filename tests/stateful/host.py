@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import TripError
 from dcmp_hil.limits import Limits
 from dcmp_hil.monitors import Finite
+from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.supervisor import Phase, Supervisor
 from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
 
@@ -27,9 +27,8 @@ class Objector:
 
     objects = False
 
-    def check(self, sample: Sample, estimate: Estimate) -> None:  # noqa: ARG002
-        if self.objects:
-            raise TripError("test", "told to", "")
+    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002
+        return Stop("test", "told to", "") if self.objects else None
 
 
 class Host:
@@ -43,6 +42,11 @@ class Host:
         self.supervisor = Supervisor(monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified)
         self.sample = Sample(-math.inf, 0.0, 0.0)
         self._phase, self._since = Phase.ARMING, 0.0
+
+    @property
+    def over(self) -> Stop | None:
+        """Why the run is over; None while it is not."""
+        return self.supervisor.check(self.sample.t, None)
 
     @property
     def has_authority(self) -> bool:
@@ -65,8 +69,8 @@ class Host:
         """Make a supervisor that has tripped go on: it must not."""
         later = self.sample._replace(t=self.sample.t + 1.0, fault=Fault.NONE)
         self.objector.objects = False
-        for stop in (self.supervisor.stop_orderly, self.supervisor.stop_now):
-            stop(TripError("test", "once more", ""), later.t)
+        for urgency in Urgency:
+            self.supervisor.stop(Stop("test", "once more", "", urgency), later.t)
         began = self.supervisor.engages(later)
         voltage = self.supervisor.admit(later, self._estimate, demand)
         if began or voltage != 0.0 or self.supervisor.phase is not Phase.TRIPPED:

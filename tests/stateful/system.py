@@ -149,9 +149,10 @@ class System:
             return
         if self.quiet:
             self._compare(host)
-        if host.supervisor.trip is not None:
+        over = host.over
+        if over is not None:
             host.look_after_trip(demand)
-            self.close(host.supervisor.trip)
+            self.close(over.error())
 
     def alone(self, ticks: int) -> None:
         """Let the board go on while the host does nothing."""
@@ -222,7 +223,7 @@ class System:
 
     def _compare(self, host: Host) -> None:
         """What host and device know of each other, nothing being lost between them."""
-        if host.supervisor.trip is not None:
+        if host.over is not None:
             return
         if self.judge.told != State.RUN:
             self.judge.note(f"the device is in state {self.judge.told}, the host in {host.supervisor.phase}")

@@ -1,0 +1,130 @@
+"""One protocol for "stop": every check returns it, raises nothing, and calls nobody back."""
+
+from __future__ import annotations
+
+import ast
+import math
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+import dcmp_hil
+from dcmp_hil.assembly import make_limits, make_outliers, make_supervisor
+from dcmp_hil.errors import DeadlineError, Explanation, TripError
+from dcmp_hil.monitors import Finite, Ranges
+from dcmp_hil.overruns import Overruns
+from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
+from dcmp_hil.probe import Probe
+from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.supervisor import Phase
+from dcmp_hil.values import Estimate, Sample, Timing
+from tests.helpers import T, bench
+
+if TYPE_CHECKING:
+    from dcmp_hil.stop import Check
+
+SAFETY = (
+    "chatter", "limits", "monitors", "outliers", "overruns", "plugins/checked", "probe", "supervisor",
+)  # fmt: skip
+ODD = (0.0, 1.0, -1e308, math.inf, -math.inf, math.nan)
+
+
+class _Broken:
+    def update(self, *_: object) -> float:
+        raise ZeroDivisionError
+
+
+def _checks() -> list[Check]:
+    rig = bench()
+    made: list[Check] = [Finite(), Ranges(1.0, 1.0), make_outliers(rig), make_limits(rig, lambda _: None)]
+    return [*made, CheckedObserver(_Broken(), "a:B"), CheckedController(_Broken(), "a:B")]
+
+
+@pytest.mark.parametrize("check", _checks(), ids=lambda check: type(check).__name__)
+def test_a_check_raises_nothing_whatever_it_is_shown(check: Check) -> None:
+    for t, position, rest in product(ODD, repeat=3):
+        stop = check.check(Sample(t, position, rest, 3), Estimate(position, rest, t))
+        assert stop is None or isinstance(stop, Stop)
+
+
+def test_probe_and_deadlines_raise_nothing_either() -> None:
+    probe, overruns = Probe(5.4, 1.0, 0.0), Overruns(T, 3)
+    for t, position, voltage in product(ODD, repeat=3):
+        for stop in (
+            Probe(5.4, 1.0, 0.0).check(Sample(t, position, voltage)),
+            probe.check(Sample(t, position, voltage)),
+            overruns.check(Timing(t, position, voltage)),
+        ):
+            assert stop is None or isinstance(stop, Stop)
+
+
+def test_no_room_of_safety_raises_a_trip_or_calls_back() -> None:
+    for name in SAFETY:
+        path = Path(dcmp_hil.__path__[0]) / f"{name}.py"
+        if not path.exists():
+            continue
+        source = path.read_text("utf-8")
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Raise) and node.exc is not None:
+                assert not any(word in ast.unparse(node) for word in ("TripError", "DeadlineError")), name
+        assert "TripError" not in source, name
+        assert "DeadlineError" not in source, name
+
+
+@pytest.mark.parametrize("urgency", Urgency)
+@pytest.mark.parametrize("phase", [Phase.SETTLING, Phase.ENGAGING, Phase.RUNNING])
+def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, urgency: Urgency) -> None:
+    supervisor = make_supervisor(bench("supervisor.probe=off"), lambda _: None)
+    asked, sent = Stop("because", "Seen.", "Look.", urgency), []
+    asked_at, over, k = None, None, 0
+    while over is None:
+        sample = Sample(k * T, 0.0, 0.0)
+        supervisor.engages(sample)
+        sent.append(supervisor.admit(sample, Estimate(0.0, 0.0, 0.0), 1.0))
+        late = None
+        if asked_at is None and k > 0 and supervisor.phase is phase:
+            asked_at, late = k, asked
+        over = supervisor.check(k * T, late)
+        k += 1
+        assert k < 2000
+    assert asked_at is not None
+    led = urgency is Urgency.RAMP and phase is not Phase.SETTLING
+    assert over == asked._replace(orderly=led)
+    assert k - 1 - asked_at <= (51 if led else 1)
+    assert sent[-1] == 0.0
+    assert (max(sent[asked_at + 1 :]) > 0.0) == (led and phase is Phase.RUNNING)
+    assert supervisor.admit(Sample(k * T, 0.0, 0.0), Estimate(0.0, 0.0, 0.0), 1.0) == 0.0
+    assert supervisor.phase is Phase.TRIPPED
+
+
+def test_the_first_cause_wins_and_is_told_as_an_error() -> None:
+    supervisor = make_supervisor(bench(), lambda _: None)
+    supervisor.stop(Stop("first", "One.", "Look."), 0.0)
+    supervisor.stop(Stop("second", "Two.", "Look.", Urgency.RAMP), 0.0)
+    over = supervisor.check(0.0, Stop("third", "Three.", "Look.", late=True))
+    assert over is not None
+    assert over.reason == "first"
+
+
+def test_a_stop_becomes_the_error_of_its_exit_code() -> None:
+    late = Stop("deadline", "Late.", "Close programs.", Urgency.RAMP, late=True).error()
+    assert isinstance(late, DeadlineError)
+    assert (str(late), late.exit_code) == ("Late. Close programs.", 5)
+    cause = ValueError("mine")
+    trip = Stop("plugin", "Seen.", "Look.", cause=cause, orderly=True).error()
+    assert isinstance(trip, TripError)
+    assert (trip.reason, trip.sentence, trip.remedy, trip.orderly) == ("plugin", "Seen.", "Look.", True)
+    assert trip.__cause__ is cause
+    assert trip.explained() is trip
+
+
+def test_the_likely_cause_is_found_after_the_end_with_notes_kept() -> None:
+    stop = Stop("disturbance", "Seen.", "", explain=lambda: Explanation("stuck", "It stands.", "Look there."))
+    trip = stop.error()
+    assert isinstance(trip, TripError)
+    trip.add_note("0 V was not confirmed")
+    found = trip.explained()
+    assert (found.reason, str(found)) == ("stuck", "It stands. Look there.")
+    assert found.__notes__ == ["0 V was not confirmed"]
