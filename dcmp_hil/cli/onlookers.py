@@ -5,6 +5,7 @@ Apart from the run itself, whose imports that process would wait for half a seco
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -44,7 +45,7 @@ def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> 
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
 
     _use_terminal()
-    return watched(RerunSink(rig=view, record=record, viewer=viewer, port=port), viewer)
+    return watched(RerunSink(view, record, viewer, port=port, spare=True), viewer)
 
 
 def dashboard_replacing(view: RigView, record: Path, viewer: Viewer, port: int) -> Sink:
@@ -87,7 +88,8 @@ class _Replacing:
         """Take consecutive periods."""
         if not self._began and len(block):
             self._began = True
-            self._beside.replace(self._target)
+            with suppress(FileNotFoundError):  # there is no room for one, and a warning has said so
+                self._beside.replace(self._target)
         self._sink.block(block)
 
     def event(self, event: Event) -> None:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 UP, FIGURES, DONE = b"up", b"figures", b"done"
 _IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
 _CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
+_ORPHANED = 1.0  # s for those that are late where the parent is gone: there is nobody to look at a window
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +180,8 @@ class _Watcher:
     def _close(self) -> None:
         """Close the other sinks, the last one first; one that takes its time is waited for at the end."""
         clock = MonotonicClock()
-        end_ns = clock.now_ns() + int(_CLOSING * 1e9)
+        orphaned = os.getppid() != self._parent
+        end_ns = clock.now_ns() + int((_ORPHANED if orphaned else _CLOSING) * 1e9)
         late = [service for service in reversed(self._services) if not service.finish(_IN_TURN)]
         for service in late:
             service.finish(max(0, end_ns - clock.now_ns()) * 1e-9)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import os
-import shutil
 import threading
 import weakref
 from contextlib import suppress
@@ -12,6 +10,7 @@ from queue import Full, Queue
 from typing import TYPE_CHECKING
 
 from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.telemetry.room import room_for, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,28 +28,6 @@ _FLUSH = 5.0  # s
 _STALL = 4.0  # s that a file does not grow in a run while it is flushed
 _FULL_STALL = 1.5  # s where there is no room: that flush may wait for ever
 _ROOM = 1 << 20  # bytes
-
-
-def room_for(file: Path) -> float:
-    """Return by how many bytes a file may grow: what is free on its disk, or the limit of this process."""
-    room = math.inf
-    with suppress(OSError):
-        room = shutil.disk_usage(file.parent).free
-    with suppress(ImportError):  # not POSIX
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
-        if limit != resource.RLIM_INFINITY:
-            room = min(room, limit - size_of(file))
-    return room
-
-
-def size_of(file: Path) -> int:
-    """Return the bytes of a file; 0 if it is not there."""
-    try:
-        return file.stat().st_size
-    except OSError:
-        return 0
 
 
 def _no_farewell() -> None:
@@ -96,6 +73,7 @@ class Outlet:
         self._clock = MonotonicClock()
         self._began_ns = self._grew_ns = 0  # the job at hand, 0 for none; when the file was seen to grow
         self._size = 0  # bytes of the file
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=THREAD, daemon=True)
         self._thread.start()
 
@@ -139,6 +117,24 @@ class Outlet:
             return False
         return True
 
+    def settle(self, within: float) -> bool:
+        """Wait until what was given to do is done; False if that takes longer than `within` (s), or is stuck.
+
+        Raises
+        ------
+        Exception
+            Whatever a job raised.
+        """
+        end_ns = self._clock.now_ns() + int(within * 1e9)
+        done = threading.Event()
+        if not self.do(lambda _: done.set()):
+            return False
+        while not done.wait(_LOOK):
+            if self._stalls(_STALL) or self._clock.now_ns() >= end_ns:
+                return False
+        self._raise_what_was_raised()
+        return True
+
     def close(self, within: float) -> None:
         """End the stream after the last job; wait for it so many seconds, or those of `ending`.
 
@@ -156,11 +152,11 @@ class Outlet:
         with suppress(Full):
             self._jobs.put(None, timeout=within)
             while (
-                self._thread.is_alive() and not self._stalls(self._ending) and self._clock.now_ns() < end_ns
+                not self._ended.is_set() and not self._stalls(self._ending) and self._clock.now_ns() < end_ns
             ):
-                self._thread.join(min(_LOOK, max(0, end_ns - self._clock.now_ns()) * 1e-9))
+                self._ended.wait(min(_LOOK, max(0, end_ns - self._clock.now_ns()) * 1e-9))
         self._raise_what_was_raised()
-        if self.file is not None and self._thread.is_alive():
+        if self.file is not None and not self._ended.is_set():
             stalled = self.stalled
             raise TimeoutError(
                 f"it did not grow for {stalled:.1f} s"
@@ -186,11 +182,13 @@ class Outlet:
         self._began_ns = self._clock.now_ns()
         try:
             self._stream.flush(timeout_sec=_FLUSH)
-        except Exception as error:  # noqa: BLE001 - a full disk or a frozen viewer: disconnecting waits for ever
+        except Exception as error:  # noqa: BLE001 - a full disk or a frozen viewer
             self._error = error if self.file is not None else self._error
-            return
+            self._ended.set()
+            threading.Event().wait()  # to leave would end the stream, which waits for the disk for ever
         self.farewell()
         self._stream.disconnect()
+        self._ended.set()
 
     def _raise_what_was_raised(self) -> None:
         error, self._error = self._error, None

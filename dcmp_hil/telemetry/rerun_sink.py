@@ -9,30 +9,25 @@ from functools import partial
 from typing import TYPE_CHECKING, Literal
 from uuid import uuid4
 
-import numpy as np
 import rerun as rr
 
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.blueprint import dashboard
+from dcmp_hil.telemetry.beginning import begin, warm_up
 from dcmp_hil.telemetry.display import display_problem
-from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.outlet import Outlet, room_for
-from dcmp_hil.telemetry.ring import FIELDS
-from dcmp_hil.telemetry.scenery import log_scenery, log_style
-from dcmp_hil.values import Event, EventKind
+from dcmp_hil.telemetry.feed import Feed
+from dcmp_hil.telemetry.outlet import Outlet
+from dcmp_hil.telemetry.room import kept_for_data, room_for, short_of
 
 if TYPE_CHECKING:
     import subprocess
-    from collections.abc import Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
-    from dcmp_hil.telemetry.frames import Call
-    from dcmp_hil.telemetry.outlet import Job
+    from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.rig_view import RigView
-    from dcmp_hil.telemetry.signals import Signal
+    from dcmp_hil.values import Event
 
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
@@ -40,6 +35,7 @@ _SERVER_START = 60.0  # s, a far limit: that it listens is an event, and nothing
 _CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
 _FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
+_FILE_SPAN = 1.0  # s of a run that go into a file at once
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
 _STUCK = (
     "The viewer has taken nothing for seconds and is left behind; the run goes on. "
@@ -47,6 +43,14 @@ _STUCK = (
 )
 _SCARCE = 100e6  # bytes free below which a disk is the likely cause
 _BEGINNING = 400e3  # bytes: scenery and layout are 250 kB
+_NO_ROOM = (
+    "{file}: there is room for {room:.0f} kB, and a recording begins with up to {beginning:.0f} kB. Free "
+    "some space, or record elsewhere (--record FILE.rrd) or not at all (--no-record)."
+)
+_SPARED = (
+    "{file} {what}: less than {needed:.3g} MB are free on its disk, and the data in run.mcap come first. "
+    "The run goes on. Free some space; `dcmp-hil export FOLDER --rrd FILE` makes the dashboard afterwards."
+)
 _NO_WINDOW = (
     "The viewer ended by itself (exit code {code}; process.log in the run's folder has its words). "
     "The run is served on port {port}: dcmp-hil view --port {port} --web"
@@ -72,6 +76,8 @@ class RerunSink:
         Recordings of the same application share the viewer's layout.
     port
         First port tried for the recording's own server, on 127.0.0.1 only (``spawn``, ``serve``, ``web``).
+    spare
+        Whether the file ends, with a warning, while its disk still has room for the data of the run.
 
     Attributes
     ----------
@@ -94,16 +100,17 @@ class RerunSink:
         viewer: Viewer,
         application: str = "dcmp-hil",
         port: int = window.PORT,
+        *,
+        spare: bool = False,
     ) -> None:
         self.warnings: list[str] = []
         self.port: int | None = None
         self._window: subprocess.Popen[bytes] | None = None
         self._rig = rig
-        self._frames = Frames(rig)
-        self._outlets: list[Outlet] = []
+        self._feeds: list[Feed] = []
+        self._needed = kept_for_data(record) if record is not None and spare else 0.0
         self._application, self._recording = application, str(uuid4())
         rr.unregister_shutdown()
-        _warm_up(rig)
         if record is not None:
             self._open_file(record)
         if viewer == "connect":
@@ -118,10 +125,8 @@ class RerunSink:
         """Take consecutive periods."""
         if not len(block):
             return
-        if not self._frames.plots:
-            self._frames.choose_lines(block)
-            self._tell(partial(_log_styles, self._frames.plots))
-        self._tell(partial(_send, self._frames.of_block(block)))
+        self._spare()
+        self._tell(lambda feed: feed.block(block))
         if self._window and (code := self._window.poll()) is not None:
             self._window = None
             if code:  # closed by the user it is 0
@@ -129,7 +134,7 @@ class RerunSink:
 
     def event(self, event: Event) -> None:
         """Take an event."""
-        self._tell(partial(_send, self._frames.of_event(event)))
+        self._tell(lambda feed: feed.event(event))
 
     def close(self) -> None:
         """Write what is left, and give up after 12 s at most; a second call waits for the first."""
@@ -137,24 +142,34 @@ class RerunSink:
         end_ns = clock.now_ns() + int(_CLOSING * 1e9)
         atexit.unregister(self.close)
         faults: list[str] = []
-        for outlet in self._outlets:
+        self._tell(Feed.send_rest)
+        for feed in self._feeds:
             try:
-                outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
+                feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
-                faults.append(_incomplete(outlet, str(error)))
+                faults.append(_incomplete(feed.outlet, str(error)))
         if faults:
             raise RuntimeError(faults[0])
 
-    def _tell(self, job: Job) -> None:
-        for outlet in tuple(self._outlets):
+    def _tell(self, give: Callable[[Feed], bool]) -> None:
+        for feed in tuple(self._feeds):
             try:
-                sentence = "" if outlet.do(job) else _stuck(outlet)
+                sentence = "" if give(feed) else _stuck(feed.outlet)
             except Exception as error:  # noqa: BLE001 - one outlet that fails is no reason to lose the other
-                outlet.leave()
-                sentence = f"{_incomplete(outlet, str(error))} The run goes on."
+                feed.outlet.leave()
+                sentence = f"{_incomplete(feed.outlet, str(error))} The run goes on."
             if sentence:
-                self._outlets.remove(outlet)
+                self._feeds.remove(feed)
                 self.warnings.append(sentence)
+
+    def _spare(self) -> None:
+        """End the file while there is room for the run's data, which comes before its picture."""
+        for feed in tuple(self._feeds):
+            file = feed.outlet.file
+            if file is not None and self._needed and short_of(file, self._needed):
+                feed.outlet.leave()
+                self._feeds.remove(feed)
+                self.warnings.append(_spared(file, "ends here", self._needed))
 
     def _stream(self) -> rr.RecordingStream:
         return rr.RecordingStream(self._application, recording_id=self._recording)
@@ -167,24 +182,32 @@ class RerunSink:
                 f"{record}: {error.strerror or error}. Choose a file for the recording that you may write, "
                 "in a folder that exists."
             ) from None
+        if self._needed and short_of(record, self._needed + _BEGINNING):
+            record.unlink(missing_ok=True)
+            self.warnings.append(_spared(record, "is not written", self._needed))
+            return
         room = room_for(record)
         if room < _BEGINNING:  # Rerun waits for ever where the disk fills up while it begins
-            raise ConfigError(
-                f"{record}: there is room for {1e-3 * room:.0f} kB, and a recording begins with up to "
-                f"{1e-3 * _BEGINNING:.0f} kB. Free some space, or record elsewhere (--record FILE.rrd) or "
-                "not at all (--no-record)."
-            )
-        stream = self._stream()
+            raise ConfigError(_NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _BEGINNING))
+        outlet = Outlet(self._stream(), _FILE_PATIENCE, _CLOSING, file=record)
+        outlet.do(partial(warm_up, self._rig))
+        # A footer would take memory for every chunk for as long as the run goes on: 25 MB a minute.
+        outlet.do(partial(begin, rr.FileSink(record, write_footer=False), self._rig))
         try:
-            _begin(rr.FileSink(record), self._rig, stream)
+            begun = outlet.settle(_FILE_PATIENCE)
         except RuntimeError as error:  # a file that can be opened, on a disk that is full
+            outlet.leave()
             raise ConfigError(f"The recording cannot begin: {error}. Free some space.") from None
-        self._outlets.append(Outlet(stream, _FILE_PATIENCE, _CLOSING, file=record))
+        if not begun:
+            outlet.leave()
+            raise ConfigError(f"The recording cannot begin: {record} does not grow. Free some space.")
+        self._feeds.append(Feed(outlet, self._rig, _FILE_SPAN))
 
     def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> Outlet:
         outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
-        outlet.do(partial(_begin, target, self._rig))
-        self._outlets.append(outlet)
+        outlet.do(partial(warm_up, self._rig))
+        outlet.do(partial(begin, target, self._rig))
+        self._feeds.append(Feed(outlet, self._rig))
         return outlet
 
     def _connect(self) -> None:
@@ -216,7 +239,7 @@ class RerunSink:
                 self.port = port
                 return outlet
             outlet.leave()  # another process took the port first
-            self._outlets.remove(outlet)
+            self._feeds.pop()
         self.warnings.append(
             f"No port from {first_port} on is free on 127.0.0.1, so no viewer was opened; "
             "close viewers that are no longer needed."
@@ -255,39 +278,5 @@ def _incomplete(outlet: Outlet, reason: str) -> str:
     return f"The recording is incomplete: {reason.rstrip('.')} ({measured}).{remedy}"
 
 
-def _begin(
-    target: rr.FileSink | rr.GrpcSink | rr.GrpcServerSink, rig: RigView, stream: rr.RecordingStream
-) -> None:
-    """Send what is known before the first period."""
-    layout = dashboard(rig)
-    stream.set_sinks(target, default_blueprint=layout)
-    stream.send_recording_name(rig.name)
-    stream.send_blueprint(layout)
-    log_scenery(stream, rig)
-    _send(Frames(rig).of_start(), stream)
-
-
-def _log_styles(plots: dict[str, list[Signal]], stream: rr.RecordingStream) -> None:
-    for plot, signals in plots.items():
-        log_style(stream, plot, signals)
-
-
-def _warm_up(rig: RigView) -> None:
-    """Make the calls of a block for nobody: the first ones take 80 ms, and the loop would wait for them."""
-    frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
-    frames.choose_lines(block)
-    stream = rr.RecordingStream("warm-up")
-    _send(
-        [
-            *frames.of_start(),
-            *frames.of_block(block),
-            *frames.of_event(Event(0.0, "INFO", EventKind.OTHER, "")),
-        ],
-        stream,
-    )
-    stream.disconnect()
-
-
-def _send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
-    for entity, times, columns in calls:
-        stream.send_columns(entity, times, columns)
+def _spared(file: Path, what: str, needed: float) -> str:
+    return _SPARED.format(file=file, what=what, needed=1e-6 * needed)

@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from dcmp_hil import process_log
 from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.telemetry.tied import tied
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -168,7 +169,7 @@ def web_url(web_port: int, port: int) -> str:
 
 
 def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
-    """Serve the web viewer's pages on `web_port` until the process is ended; they show what is on `port`.
+    """Serve the web viewer's pages on `web_port` until this process or that one ends; they show `port`.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
     """
     options = ["--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port), proxy_url(port)]
     return subprocess.Popen(  # noqa: S603 - the binary of our own dependency
-        [viewer_binary(), *options],
+        tied([str(viewer_binary()), *options]),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=process_log.for_programs(),

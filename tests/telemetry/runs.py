@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,9 +28,11 @@ from dcmp_hil.values import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
+    from rerun.chunk import Chunk
 
     from dcmp_hil.telemetry.recorder import Sink
 
@@ -101,12 +104,20 @@ def feed(sink: Sink, periods: int = 1000, *, known: bool = True) -> dict[str, ND
     return keeper.columns()
 
 
-def read_back(path: Path, entity: str) -> dict[str, list[object]]:
-    """Return the columns of an entity of a recording, those of its chunks joined; static ones too."""
+def chunks(path: Path) -> Iterator[Chunk]:
+    """Yield the chunks of a recording; that it has no footer, which Rerun warns of, is meant."""
     from rerun.chunk import RrdReader
 
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "RRD file has no footer")
+        reader = RrdReader(path)
+    yield from reader.stream()
+
+
+def read_back(path: Path, entity: str) -> dict[str, list[object]]:
+    """Return the columns of an entity of a recording, those of its chunks joined; static ones too."""
     table: dict[str, list[object]] = {}
-    for chunk in RrdReader(path).stream():
+    for chunk in chunks(path):
         if chunk.entity_path == f"/{entity}":
             batch = chunk.to_record_batch()
             for name in batch.schema.names:
@@ -116,9 +127,7 @@ def read_back(path: Path, entity: str) -> dict[str, list[object]]:
 
 def entities(path: Path) -> set[str]:
     """Return the paths of all entities of a recording."""
-    from rerun.chunk import RrdReader
-
-    return {chunk.entity_path.removeprefix("/") for chunk in RrdReader(path).stream()}
+    return {chunk.entity_path.removeprefix("/") for chunk in chunks(path)}
 
 
 def values(path: Path, plot: str) -> NDArray[np.float64]:

@@ -368,7 +368,7 @@ def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
     _wait(lambda: not Path(f"/proc/{pid}").exists())
     assert noted(notes, "closed") == [""]
     periods = sum(map(int, noted(notes, "rows")))
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == periods  # and it has a footer
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == periods
 
 
 def _wait(until: Callable[[], bool]) -> None:

@@ -97,7 +97,7 @@ def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
     troubles = [
         sentence
         for sentence in figures["troubles"]
-        if "incomplete" in sentence or "taken nothing" in sentence
+        if "incomplete" in sentence or "run.mcap come first" in sentence
     ]
     assert len(troubles) == len(figures["troubles"])
     assert 1 <= len(troubles) <= 2  # run.mcap and run.rrd, one sentence each

@@ -1,0 +1,41 @@
+"""What a recording begins with; done by the thread of its outlet, since Rerun may never return from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from dcmp_hil.telemetry.block import Block
+from dcmp_hil.telemetry.blueprint import dashboard
+from dcmp_hil.telemetry.feed import send
+from dcmp_hil.telemetry.frames import Frames
+from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.telemetry.scenery import log_scenery
+from dcmp_hil.values import Event, EventKind
+
+if TYPE_CHECKING:
+    from dcmp_hil.telemetry.rig_view import RigView
+
+
+def begin(
+    target: rr.FileSink | rr.GrpcSink | rr.GrpcServerSink, rig: RigView, stream: rr.RecordingStream
+) -> None:
+    """Send what is known before the first period."""
+    layout = dashboard(rig)
+    stream.set_sinks(target, default_blueprint=layout)
+    stream.send_recording_name(rig.name)
+    stream.send_blueprint(layout)
+    log_scenery(stream, rig)
+    send(Frames(rig).of_start(), stream)
+
+
+def warm_up(rig: RigView, _: rr.RecordingStream) -> None:
+    """Make the calls of a block for nobody: the first ones take 80 ms, and the loop would wait for them."""
+    frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
+    frames.choose_lines(block)
+    stream = rr.RecordingStream("warm-up")
+    nothing = Event(0.0, "INFO", EventKind.OTHER, "")
+    send([*frames.of_start(), *frames.of_block(block), *frames.of_event(nothing)], stream)
+    stream.disconnect()

@@ -1,0 +1,100 @@
+"""What one outlet is sent: frames of its own, in blocks as long as suits it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dcmp_hil.telemetry.block import Block
+from dcmp_hil.telemetry.frames import Frames
+from dcmp_hil.telemetry.scenery import log_style
+from dcmp_hil.values import EventKind
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import rerun as rr
+
+    from dcmp_hil.telemetry.frames import Call
+    from dcmp_hil.telemetry.outlet import Outlet
+    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.signals import Signal
+    from dcmp_hil.values import Event
+
+
+class Feed:
+    """Turns a run into jobs of an outlet.
+
+    A chunk of a recording costs 1.6 kB beside its numbers, so a file is written in longer blocks than those
+    that a viewer needs to look alive.
+
+    Parameters
+    ----------
+    outlet
+        Who does the jobs.
+    rig
+        What is shown of it.
+    span
+        s of a run that are sent at once; 0 sends each block as it comes.
+    """
+
+    def __init__(self, outlet: Outlet, rig: RigView, span: float = 0.0) -> None:
+        self.outlet = outlet
+        self._frames = Frames(rig)
+        self._span, self._period = span, rig.period
+        self._waiting: list[Block] = []
+
+    def block(self, block: Block) -> bool:
+        """Send consecutive periods, at least one, or keep them until there are enough.
+
+        Returns
+        -------
+        bool
+            False if the outlet is stuck.
+
+        Raises
+        ------
+        Exception
+            Whatever an earlier job raised.
+        """
+        self._waiting.append(block)
+        if block["t"][-1] + 1.5 * self._period - self._waiting[0]["t"][0] < self._span:
+            return True
+        return self.send_rest()
+
+    def event(self, event: Event) -> bool:
+        """Send an event, behind the periods before it; see `block`."""
+        on = event.kind is EventKind.LINK or self.send_rest()  # what an event changes is drawn from there on
+        return on and self.outlet.do(partial(send, self._frames.of_event(event)))
+
+    def send_rest(self) -> bool:
+        """Send what waits; see `block`."""
+        if not self._waiting:
+            return True
+        block = _joined(self._waiting)
+        self._waiting = []
+        styles: dict[str, list[Signal]] = {}
+        if not self._frames.plots:
+            self._frames.choose_lines(block)
+            styles = self._frames.plots
+        return self.outlet.do(partial(_send_block, styles, self._frames.of_block(block)))
+
+
+def send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
+    """Send columns."""
+    for entity, times, columns in calls:
+        stream.send_columns(entity, times, columns)
+
+
+def _send_block(styles: dict[str, list[Signal]], calls: Sequence[Call], stream: rr.RecordingStream) -> None:
+    for plot, signals in styles.items():
+        log_style(stream, plot, signals)
+    send(calls, stream)
+
+
+def _joined(blocks: list[Block]) -> Block:
+    if len(blocks) == 1:
+        return blocks[0]
+    return Block(np.concatenate([block.rows for block in blocks]), blocks[0].model)
