@@ -29,6 +29,7 @@ RANGES = {
     Parameter.LAST_FAULT: (0, 255),
     Parameter.LAST_FAULT_DETAIL: (-_INT - 1, _INT),
     Parameter.SUPPLY_MV: (0, _INT),
+    Parameter.TRAVEL_ORIGIN_COUNTS: (-1, 2**24 - 1),
 }
 """What a value can be at all, both ends included."""
 COMPARED = (
@@ -106,7 +107,13 @@ def _supply(asked_mV: int, found_mV: int) -> str:
 
 
 def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+    """Say which limits of the device are below the rig's.
+
+    Travel as the board was built with it counts from where the device was armed first: with a zero that is
+    a count that may be half a turn from hanging.
+    """
     rad = math.tau / device[Parameter.COUNTS_PER_REV]
+    away = 0.0 if terms.zero is None else math.pi
     limits: list[tuple[str, float | None, float]] = [
         (
             "amplifier.voltage_limit_V",
@@ -121,7 +128,7 @@ def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
         (
             "supervisor.position_limit_rad",
             terms.position_limit,
-            _rounded_down(rad * device[Parameter.TRAVEL_LIMIT_COUNTS]),
+            _rounded_down(rad * device[Parameter.TRAVEL_LIMIT_COUNTS] - away),
         ),
     ]
     slew = device[Parameter.SLEW_MV_PER_MS]

@@ -63,7 +63,7 @@ class DeviceBackend:
         self._open = False
         self._session = 0
         self._tick = self._first_tick = 0
-        self._count = self._zero = 0
+        self._count = self._zero = self._hanging = 0
         self._has_count = False
         self._t = 0.0
         self._fault: int = Fault.NONE
@@ -100,7 +100,7 @@ class DeviceBackend:
             raise
         self._session, self.firmware = greeting.session, greeting.firmware
         self._cleared, self.remarks = greeting.cleared, greeting.remarks
-        self._tick = greeting.tick
+        self._tick, self._hanging = greeting.tick, greeting.zero
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
         self._heard_ns = self._clock.now_ns()
@@ -269,8 +269,8 @@ class DeviceBackend:
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
         zero = self._terms.zero
-        self._count = nearest(zero or 0, raw, 24)  # near the counter's wrap it matters
-        self._zero = self._count if zero is None else zero
+        self._zero = nearest(0, self._hanging, 24) if zero is None else zero
+        self._count = nearest(self._zero, raw, 24)  # near the counter's wrap it matters
 
     def _fault_in(self, report: SampleReport, last: int) -> int:
         """Return the fault of a device that is not in RUN; `last` is the tick at which it was."""

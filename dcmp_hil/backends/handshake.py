@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
 from dcmp_hil.backends.clearing import Clearing
-from dcmp_hil.backends.comparison import COMPARED, differences, is_possible, remarks
+from dcmp_hil.backends.comparison import differences, remarks
+from dcmp_hil.backends.parameters import Parameters
 from dcmp_hil.errors import BackendError, ConfigError
 from dcmp_hil.wire.messages import (
     Drive,
@@ -18,9 +19,7 @@ from dcmp_hil.wire.messages import (
     Identity,
     Parameter,
     ParameterGet,
-    ParameterSet,
     ParameterValue,
-    Result,
     SampleReport,
     State,
     Stop,
@@ -29,6 +28,8 @@ from dcmp_hil.wire.messages import (
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from dcmp_hil.backends.caller import Caller
     from dcmp_hil.backends.link import Link
     from dcmp_hil.backends.terms import Terms
@@ -53,6 +54,7 @@ class Greeting(NamedTuple):
     firmware: str
     cleared: str  # name of a fault of an earlier run; empty for none
     remarks: tuple[str, ...]  # what a person should know of this device
+    zero: int  # count modulo 2^24 at which the arm hangs, as the device was told
 
 
 class Handshake:
@@ -73,6 +75,7 @@ class Handshake:
     def __init__(self, link: Link, caller: Caller, terms: Terms, clock: Clock) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._session = 1 + secrets.randbelow(0xFFFF)
+        self._parameters = Parameters(link.name, caller, self._session)
         self._damaged_before = 0
         self._booted_ns = 0  # the latest that a board has booted
 
@@ -94,11 +97,12 @@ class Handshake:
         try:
             firmware = self._introduce()
             self._check_round_trip()
-            found = self._compare()
+            found = self._parameters.compared()
+            told = self._compare(found)
             self._check_alone()
             self._join_ticks()
             cleared = self._clearing().run()
-            self._set_limits()
+            zero = self._parameters.put_limits(self._terms, found)
             self._join_ticks()
             self._check_cold()
             arming = True
@@ -112,7 +116,7 @@ class Handshake:
             else:
                 self._give_back()
             raise
-        return Greeting(self._session, self._caller.tick, firmware, cleared, tuple(found))
+        return Greeting(self._session, self._caller.tick, firmware, cleared, tuple(told), zero)
 
     @property
     def _damaged(self) -> int:
@@ -133,7 +137,7 @@ class Handshake:
     def _give_back(self) -> None:
         """Release the session, so that whoever tries next need not wait until it lapses."""
         with contextlib.suppress(BackendError):
-            self._get(Parameter.TICK)
+            self._parameters.get(Parameter.TICK)
             for _ in range(_RELEASES):
                 self._caller.hear_sample(_NEXT_S)  # a command must answer a newer one than the last did
                 self._say(release=True)
@@ -190,9 +194,8 @@ class Handshake:
         if identity.owned and identity.busy:
             raise refusals.impossible(name, "that this host owns it and another one does")
 
-    def _compare(self) -> list[str]:
+    def _compare(self, found: Mapping[Parameter, int]) -> list[str]:
         """Hold the rig against the device, every difference at once; return what is worth a remark."""
-        found = {parameter: self._get(parameter) for parameter in COMPARED}
         faults = differences(self._terms, found)
         if faults:
             raise ConfigError(*faults)
@@ -232,19 +235,6 @@ class Handshake:
     def _clearing(self) -> Clearing:
         return Clearing(self._link.name, self._caller, self._clock, self._session, self._terms.watchdog_ms)
 
-    def _set_limits(self) -> None:
-        terms = self._terms
-        for parameter, value in (
-            (Parameter.WATCHDOG_MS, terms.watchdog_ms),
-            (Parameter.VOLTAGE_LIMIT_MV, terms.voltage_limit_mV),
-            (Parameter.SLEW_MV_PER_MS, terms.slew_mV_per_ms),
-        ):
-            if value is None:
-                continue
-            found = self._ask(ParameterSet(self._session, parameter, value))
-            if found is None or found.result != Result.OK or found.value != value:
-                raise refusals.not_taken(self._link.name, parameter.name, value, found)
-
     def _arm(self) -> None:
         """Answer SAMPLEs at 0 V until one says RUN."""
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
@@ -267,23 +257,12 @@ class Handshake:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
         told = 0
         for _ in range(_JOINS):
-            told = self._get(Parameter.TICK)
+            told = self._parameters.get(Parameter.TICK)
             if self._caller.hear_sample(PATIENCE) is None:
                 continue
             if _EARLY <= self._caller.tick - told <= _LATE:
                 return
         raise refusals.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
-
-    def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
-        return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)
-
-    def _get(self, parameter: Parameter) -> int:
-        found = self._ask(ParameterGet(parameter))
-        if found is None or found.result != Result.OK:
-            raise refusals.not_told(self._link.name, parameter.name)
-        if not is_possible(parameter, found.value):
-            raise refusals.impossible(self._link.name, f"{parameter.name} = {found.value}")
-        return found.value
 
 
 def _is_tick(answer: ParameterValue) -> bool:

@@ -157,6 +157,14 @@ def not_taken(name: str, parameter: str, value: int, answer: ParameterValue | No
     )
 
 
+def not_kept(name: str, parameter: str, value: int, kept: int) -> OpenError:
+    """Refuse a device that says another limit than it has just taken."""
+    return OpenError(
+        f"{name}: {parameter} was set to {value}, and reads {kept} a moment later. The limits of a run "
+        "have to hold in the device: look for a second host on the line, or for firmware of another make."
+    )
+
+
 def _result(result: int) -> str:
     return Result(result).name if result in set(Result) else f"result {result}"
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 _UNLIMITED = 32_767  # mV: what the wire can say
+_MOST = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,8 @@ class Terms:
         Count at which the arm hangs; None for where it is at the start.
     velocity_limit, position_limit
         rad/s and rad either way, at which the host ends a run; None where it watches neither.
+    speed_limit_counts_s, travel_limit_counts
+        The same for the device, which keeps them whether the host watches or not.
     boot_wait
         s, for the first sample.
     warn_share, warn_clock_share
@@ -61,6 +64,8 @@ class Terms:
     zero: int | None
     velocity_limit: float | None
     position_limit: float | None
+    speed_limit_counts_s: int
+    travel_limit_counts: int
     boot_wait: float
     warn_share: float
     warn_clock_share: float
@@ -94,7 +99,14 @@ class Terms:
             zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
             velocity_limit=limits.velocity_limit_rad_s if watched else None,
             position_limit=limits.position_limit_rad if watched else None,
+            speed_limit_counts_s=_counts(limits.velocity_limit_rad_s, counts),
+            travel_limit_counts=_counts(limits.position_limit_rad, counts),
             boot_wait=device.boot_wait_s,
             warn_share=1e-2 * device.warn_percent,
             warn_clock_share=1e-2 * device.warn_clock_percent,
         )
+
+
+def _counts(limit: float, counts_per_rev: float) -> int:
+    """Return a limit in radians in whole counts, never above it unless it is below one."""
+    return max(1, min(math.floor(limit * counts_per_rev / math.tau), _MOST))

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 WHAT_MOVES = (
     "With --arm the motor is switched on about 30 times, for 0.3 s each at most, mostly at up to 300 mV; "
-    "once, for `travel-limit`, at 1 V until the arm has moved two encoder counts. Keep clear of the arm, "
+    "twice, for `travel-limit` and `speed-limit`, up to 1 V until the arm has moved a few encoder counts. "
+    "Keep clear of the arm, "
     "let it hang freely, limit the supply, have the e-stop within reach."
 )
 _COLOURS = {

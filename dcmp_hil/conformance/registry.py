@@ -10,6 +10,7 @@ from dcmp_hil.conformance.checks import (
     drives,
     faults,
     frames,
+    limits,
     parameters,
     running,
     sessions,
@@ -30,5 +31,6 @@ CHECKS: tuple[Check, ...] = (
     *parameters.CHECKS,
     *arming.CHECKS,
     *running.CHECKS,
+    *limits.CHECKS,
     *watchdog.CHECKS,
 )

@@ -41,6 +41,7 @@ class Parameter(IntEnum):
     LAST_FAULT = 13
     LAST_FAULT_DETAIL = 14
     SUPPLY_MV = 15
+    TRAVEL_ORIGIN_COUNTS = 16
 
 
 class Result(IntEnum):

@@ -1,10 +1,10 @@
 #include "dcmp_encoder.h"
 
-#define SPEED_WINDOW_US 1000
+#define SHORT_US 1000 /* finds a push soon, but a limit below a count or two in it not at all */
+#define LONG_US 8000  /* for these */
 #define SECOND_US 1000000
 #define JUMP_FACTOR 4 /* times the speed limit */
 #define JUMP_FLOOR 8  /* counts: below, a short period would make a jump of every step */
-#define MOST_WINDOWS 2u /* that speed is taken over */
 
 static int64_t magnitude(int64_t value)
 {
@@ -53,9 +53,8 @@ static int64_t change(const struct dcmp_encoder *encoder, uint32_t end, uint32_t
 }
 
 /* A wrong count makes one change too large and one, the other way, when it is the older end: never the middle one. */
-static int64_t middle_change(const struct dcmp_encoder *encoder, uint32_t windows)
+static int64_t middle_change(const struct dcmp_encoder *encoder, uint32_t periods)
 {
-    const uint32_t periods = windows * encoder->span;
     return middle(change(encoder, 0, periods), change(encoder, 1, periods), change(encoder, 2, periods));
 }
 
@@ -70,36 +69,47 @@ static bool is_jump(int32_t step, int32_t speed_limit, int32_t period_us)
     return magnitude(step) > JUMP_FLOOR && magnitude(step) * SECOND_US > most;
 }
 
-/* One count more than the speed says, at most, for each stretch: a count is no finer than that at either end. */
-static bool above(int64_t moved, int64_t stretches, int32_t speed_limit, int32_t stretch_us)
+/* A count is no finer than that at either end, so a steady speed may show a count more than it has. */
+static bool above(int64_t moved, int64_t spare, int32_t speed_limit, int32_t us)
 {
-    return (magnitude(moved) - stretches) * SECOND_US > stretches * speed_limit * stretch_us;
+    return (magnitude(moved) - spare) * SECOND_US > (int64_t)speed_limit * us;
 }
 
-/* The fewest windows over which it is too fast; more than there are, if over none. */
-static uint32_t windows_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
+/* The shortest window over which it is too fast; DCMP_WINDOWS if over none. */
+static uint32_t window_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
 {
-    uint32_t windows = 1;
-    while (windows <= MOST_WINDOWS &&
-           !above(middle_change(encoder, windows), windows, speed_limit, encoder->window_us)) {
-        windows++;
+    uint32_t i = 0;
+    while (i < DCMP_WINDOWS) {
+        const struct dcmp_window *window = &encoder->windows[i];
+        if (above(middle_change(encoder, window->periods), window->spare, speed_limit, window->us)) {
+            break;
+        }
+        i++;
     }
-    return windows;
+    return i;
+}
+
+static struct dcmp_window window_of(int32_t periods, uint8_t spare, int32_t period_us)
+{
+    const struct dcmp_window window = {(uint8_t)periods, spare, periods * period_us};
+    return window;
 }
 
 void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
 {
-    const int32_t span = (SPEED_WINDOW_US + period_us - 1) / period_us;
+    const int32_t brief = (SHORT_US + period_us - 1) / period_us;
     encoder->raw = 0;
     encoder->raw_before = 0;
+    encoder->raw_oldest = 0;
     encoder->started = false;
     encoder->position = 0;
     for (uint32_t i = 0; i < DCMP_POSITIONS; i++) {
         encoder->past[i] = 0;
     }
     encoder->newest = 0;
-    encoder->span = (uint8_t)span;
-    encoder->window_us = span * period_us;
+    encoder->windows[0] = window_of(brief, 1, period_us);
+    encoder->windows[1] = window_of(2 * brief, 2, period_us);
+    encoder->windows[2] = window_of((LONG_US + period_us - 1) / period_us, 1, period_us);
     encoder->jump = 0;
     encoder->jumped = false;
     dcmp_history_init(&encoder->jumps);
@@ -117,13 +127,14 @@ void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t sp
     if (encoder->jumped) {
         encoder->jump = step;
     }
-    if ((near_a_jump || encoder->jumped) && !above(two_steps, 2, speed_limit, period_us)) {
+    if ((near_a_jump || encoder->jumped) && !above(two_steps, 2, speed_limit, 2 * period_us)) {
         encoder->position = past(encoder, 1) + two_steps; /* the count between was wrong */
     } else if (!encoder->jumped) {
         encoder->position += step;
     } else {
         /* the next count says whether this one was wrong */
     }
+    encoder->raw_oldest = encoder->started ? encoder->raw_before : counts & DCMP_COUNT_MASK;
     encoder->raw_before = encoder->started ? encoder->raw : counts & DCMP_COUNT_MASK;
     encoder->raw = counts & DCMP_COUNT_MASK;
     encoder->started = true;
@@ -146,7 +157,7 @@ bool dcmp_encoder_too_jumpy(const struct dcmp_encoder *encoder)
 
 bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
 {
-    return windows_too_fast(encoder, speed_limit) <= MOST_WINDOWS;
+    return window_too_fast(encoder, speed_limit) < DCMP_WINDOWS;
 }
 
 bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_limit)
@@ -156,11 +167,18 @@ bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_lim
 
 int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, int32_t speed_limit)
 {
-    const uint32_t windows = windows_too_fast(encoder, speed_limit) == MOST_WINDOWS ? MOST_WINDOWS : 1u;
-    return nearest(middle_change(encoder, windows) * SECOND_US / ((int64_t)windows * encoder->window_us));
+    const struct dcmp_window *window = &encoder->windows[window_too_fast(encoder, speed_limit) % DCMP_WINDOWS];
+    return nearest(middle_change(encoder, window->periods) * SECOND_US / window->us);
 }
 
 int32_t dcmp_encoder_travel(const struct dcmp_encoder *encoder)
 {
     return nearest(middle_position(encoder) - encoder->origin);
+}
+
+int32_t dcmp_encoder_distance(const struct dcmp_encoder *encoder, int32_t origin_counts)
+{
+    const uint32_t origin = (uint32_t)origin_counts;
+    return (int32_t)middle(difference(encoder->raw, origin), difference(encoder->raw_before, origin),
+                           difference(encoder->raw_oldest, origin));
 }

@@ -23,6 +23,12 @@ static bool live(const struct dcmp_device *device)
     return device->supervisor.state == DCMP_ARMING || device->supervisor.state == DCMP_RUN;
 }
 
+void dcmp_guard_end_session(struct dcmp_device *device)
+{
+    dcmp_session_end(&device->session);
+    dcmp_parameters_restore(&device->parameters);
+}
+
 void dcmp_guard_time(struct dcmp_device *device, uint32_t now_us)
 {
     if (live(device) && dcmp_watchdog_expired(&device->watchdog, now_us)) {
@@ -33,7 +39,25 @@ void dcmp_guard_time(struct dcmp_device *device, uint32_t now_us)
         dcmp_guard_raise(device, DCMP_EVENT_LINK_DOWN, DCMP_LINK_DOWN, 0);
     }
     if (!live(device) && dcmp_session_lapsed(&device->session, now_us)) {
-        dcmp_session_end(&device->session);
+        dcmp_guard_end_session(device);
+    }
+}
+
+static void check_travel(struct dcmp_device *device)
+{
+    const struct dcmp_encoder *encoder = &device->encoder;
+    const int32_t limit = device->parameters.value[DCMP_TRAVEL_LIMIT_COUNTS];
+    const int32_t origin = device->parameters.value[DCMP_TRAVEL_ORIGIN_COUNTS];
+    int32_t since_arming = limit;
+    if (origin != DCMP_FIRST_ARMING) {
+        const int32_t distance = dcmp_encoder_distance(encoder, origin);
+        if (distance > limit || distance < -limit) {
+            dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, distance);
+        }
+        since_arming = device->parameters.built[DCMP_TRAVEL_LIMIT_COUNTS]; /* whatever a session calls its origin */
+    }
+    if (dcmp_encoder_too_far(encoder, since_arming)) {
+        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, dcmp_encoder_travel(encoder));
     }
 }
 
@@ -47,7 +71,5 @@ void dcmp_guard_limits(struct dcmp_device *device)
     if (dcmp_encoder_too_fast(encoder, speed_limit)) {
         dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_SPEED, dcmp_encoder_speed(encoder, speed_limit));
     }
-    if (dcmp_encoder_too_far(encoder, device->parameters.value[DCMP_TRAVEL_LIMIT_COUNTS])) {
-        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, dcmp_encoder_travel(encoder));
-    }
+    check_travel(device);
 }

@@ -12,6 +12,9 @@ void dcmp_guard_settle(struct dcmp_device *device);
 /* Something happened that may lead to FAULT. */
 void dcmp_guard_raise(struct dcmp_device *device, enum dcmp_event event, enum dcmp_fault_code code, int32_t detail);
 
+/* The owner is none any more, and its limits go with it. */
+void dcmp_guard_end_session(struct dcmp_device *device);
+
 /* Watchdog, link and lease: whatever time alone can bring about. */
 void dcmp_guard_time(struct dcmp_device *device, uint32_t now_us);
 

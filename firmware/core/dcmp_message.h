@@ -52,7 +52,8 @@ enum dcmp_parameter {
     DCMP_EDGE_STAMPS,
     DCMP_LAST_FAULT,
     DCMP_LAST_FAULT_DETAIL,
-    DCMP_SUPPLY_MV
+    DCMP_SUPPLY_MV,
+    DCMP_TRAVEL_ORIGIN_COUNTS
 };
 
 /* In the order in which they are looked for: the first that applies is answered. */

@@ -8,9 +8,10 @@
 #include "dcmp_device.h"
 #include "dcmp_message.h"
 
-#define DCMP_PARAMETER_SLOTS 16u /* numbers from 1 on */
+#define DCMP_PARAMETER_SLOTS 17u /* numbers from 1 on */
 #define DCMP_WATCHDOG_MIN_MS 5
 #define DCMP_WATCHDOG_MAX_MS 50
+#define DCMP_FIRST_ARMING (-1) /* TRAVEL_ORIGIN_COUNTS: travel counts from where the device was armed first */
 
 struct dcmp_range {
     int32_t lowest; /* above `highest`: may not be set */
@@ -28,7 +29,7 @@ bool dcmp_config_valid(const struct dcmp_config *config);
 
 void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_config *config);
 
-/* Forget what a host changed: the next one finds the board as it was built. */
+/* Forget what a session changed: the board is as it was built. */
 void dcmp_parameters_restore(struct dcmp_parameters *parameters);
 
 /* 0 for one that does not exist. */

@@ -2,6 +2,6 @@
 #ifndef DCMP_PROTOCOL_HASH_H
 #define DCMP_PROTOCOL_HASH_H
 
-#define DCMP_PROTOCOL_HASH 0xeb5b950bu
+#define DCMP_PROTOCOL_HASH 0x074280f0u
 
 #endif

@@ -28,7 +28,7 @@ static void accept(struct dcmp_device *device, const struct dcmp_drive *drive, u
     dcmp_amplifier_command(&device->amplifier, drive->voltage_mV);
     dcmp_guard_settle(device); /* outside RUN the command is forgotten again */
     if (drive->release) {
-        dcmp_session_end(&device->session);
+        dcmp_guard_end_session(device);
     }
 }
 
@@ -61,7 +61,6 @@ static void receive_hello(struct dcmp_device *device, const struct dcmp_frame *f
     if (!identity.mismatch) {
         if (dcmp_session_ask(session, hello.session, now_us)) {
             device->supervisor.lowered = false; /* a fault is left by an edge of one session */
-            dcmp_parameters_restore(&device->parameters);
         } else if (dcmp_session_owns(session, hello.session)) {
             dcmp_session_renew(session, now_us);
         } else {

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from tests.conformance.seed import Seed
 from tests.conformance.seeds_drives import drive_seed
 from tests.contract import stranger_wire as wire
+from tests.contract.stranger_motion import Motion
 from tests.contract.stranger_wire import RUN
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
     from tests.conformance.seed import Row
 
@@ -118,6 +119,53 @@ class NoTravelLimit(Seed):
             super()._trip(code, detail)
 
 
+class NoSpeedLimit(Seed):
+    def _trip(self, code: int, detail: int) -> None:
+        if code != wire.OVER_SPEED:
+            super()._trip(code, detail)
+
+
+def speed_seed(windows: Callable[[Motion], Sequence[int]], more: int = 0) -> type[Seed]:
+    """Return a device that takes speed over other periods than it should, or lets more counts pass."""
+
+    class Speed(Motion):
+        def limits(
+            self, jump: int, speed_limit: int, travel_limits: Sequence[tuple[int, int]]
+        ) -> Iterator[tuple[int, int]]:
+            for code, detail in super().limits(jump, speed_limit, travel_limits):
+                seen = (abs(self._moved(periods)) - 1 - more > 0 for periods in windows(self))
+                if code != wire.OVER_SPEED or any(seen):
+                    yield code, detail
+
+    class Device(Seed):
+        def sow(self) -> None:
+            self._motion = Speed(self.period_us)
+
+    return Device
+
+
+class ShorterWindow(Seed):
+    def sow(self) -> None:
+        self._motion._long //= 2
+
+
+class OriginIgnored(Seed):
+    def _travel_limits(self) -> list[tuple[int, int]]:
+        return [(-1, self._set[wire.TRAVEL_LIMIT])]
+
+
+class OriginWithTheBuiltLimit(Seed):
+    def _travel_limits(self) -> list[tuple[int, int]]:
+        return [(self._set[wire.TRAVEL_ORIGIN], self.travel_limit_counts)]
+
+
+class OriginMirrored(Seed):
+    def _travel_limits(self) -> list[tuple[int, int]]:
+        return [
+            (-origin % 2**24 if origin > 0 else origin, limit) for origin, limit in super()._travel_limits()
+        ]
+
+
 SEEDS: dict[str, Row] = {
     "voltage is a period late": (OnePeriodLate, "can", "voltage"),
     "the voltage's sign is lost": (
@@ -137,5 +185,13 @@ SEEDS: dict[str, Row] = {
     "HELLO feeds the watchdog": (FedByHello, "can", "watchdog-fed"),
     "corrupt frames never end RUN": (CorruptIsFine, "can", "corrupt-link"),
     "two corrupt frames end RUN": (TwoCorruptEnd, "can", "corrupt-link"),
+    "no speed limit": (NoSpeedLimit, "can", "speed-limit"),
+    "speed over 1 ms only": (speed_seed(lambda m: (m._periods,)), "can", "speed-limit"),
+    "no speed over 8 ms": (speed_seed(lambda m: (m._periods, 2 * m._periods)), "can", "speed-limit"),
+    "speed over 4 ms instead of 8": (ShorterWindow, "can", "speed-limit"),
+    "a count too many over 8 ms": (speed_seed(lambda m: (m._long,), more=1), "can", "speed-limit"),
+    "the origin of travel is ignored": (OriginIgnored, "can", "travel-origin"),
+    "about the origin the built limit holds": (OriginWithTheBuiltLimit, "can", "travel-origin"),
+    "the origin of travel is mirrored": (OriginMirrored, "can", "travel-origin"),
     "no travel limit": (NoTravelLimit, "can", "travel-limit"),
 }  # fmt: skip

@@ -121,6 +121,20 @@ class OneParameterStays(Seed):
         self._parameters.restore = restore  # type: ignore[method-assign]
 
 
+class ParametersStayForANext(Seed):
+    """What the device did before: they are as built when the next session comes, not before."""
+
+    def sow(self) -> None:
+        self._usual = self._parameters.restore
+        self._parameters.restore = lambda: None  # type: ignore[method-assign]
+
+    def _on_hello(self, content: bytes) -> None:
+        owner = self._owner
+        super()._on_hello(content)
+        if self._owner != owner:
+            self._usual()
+
+
 def change_seed(change: Callable[[dict[str, Any]], int | None]) -> type[Seed]:
     """Return a device whose PARAMETER_SET answers otherwise: None goes on as usual."""
 
@@ -210,6 +224,7 @@ SEEDS: dict[str, Row] = {
     "a HELLO with another hash renews ownership": (WrongHashRenews, "can", "lease"),
     "PARAMETER_SET does not renew ownership": (SetsDoNotRenew, "can", "lease"),
     "parameters outlast their owner": (ParametersStay, "can", "as-built"),
+    "parameters last until the next owner": (ParametersStayForANext, "can", "as-built"),
     "one parameter outlasts its owner": (OneParameterStays, "can", "as-built"),
     "a parameter is missing": (ParameterMissing, "can", "parameters-read"),
     "an unknown parameter is 0, OK": (UnknownIsZero, "can", "parameters-unknown"),

@@ -192,7 +192,6 @@ class Stranger:
         if session and theirs == HASH and self._owner in {0, session}:
             if self._owner == 0:
                 self._begin_session(session)
-                self._parameters.restore()
             self._heard_us = self.now_us
         owned = session != 0 and self._owner == session
         flags = (self._owner != 0 and not owned) + 2 * owned + 4 * (theirs != HASH)
@@ -254,6 +253,7 @@ class Stranger:
         self._heard_us = self.now_us
         self._last_seq = -1
         self._may_clear = False
+        self._parameters.restore()
 
     def _pass(self, us: int) -> None:
         self.now_us += us
@@ -266,11 +266,16 @@ class Stranger:
 
     def _findings(self, jump: int) -> Iterator[tuple[int, int]]:
         if self.state == RUN:
-            yield from self._motion.limits(jump, self._set[wire.SPEED_LIMIT], self._set[wire.TRAVEL_LIMIT])
+            yield from self._motion.limits(jump, self._set[wire.SPEED_LIMIT], self._travel_limits())
         if self.state in {ARMING, RUN} and self._silent_us():
             yield wire.HOST_SILENT, self._silent_us()
         if not self._link_up:
             yield wire.LINK_DOWN, 0
+
+    def _travel_limits(self) -> list[tuple[int, int]]:
+        """Return origins and limits: a session's, and what counts from the first arming."""
+        origin, limit = self._set[wire.TRAVEL_ORIGIN], self._set[wire.TRAVEL_LIMIT]
+        return [(-1, limit)] if origin < 0 else [(origin, limit), (-1, self.travel_limit_counts)]
 
     def _trip(self, code: int, detail: int) -> None:
         """From RUN to FAULT, from ARMING to IDLE; the first cause stays."""

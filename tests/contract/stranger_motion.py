@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tests.contract.stranger_wire import ENCODER_JUMP, OVER_SPEED, OVER_TRAVEL
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 
 def _shortest(change: int) -> int:
@@ -21,10 +21,11 @@ class Motion:
 
     def __init__(self, period_us: int) -> None:
         self.raw: int | None = None
-        self._raws: deque[int] = deque(maxlen=2)
+        self._raws: deque[int] = deque(maxlen=3)
         self._period_us = period_us
         self._periods = -(-1000 // period_us)
-        kept = 2 * self._periods + 3
+        self._long = -(-8000 // period_us)
+        kept = max(2 * self._periods, self._long) + 3
         self._counts: deque[int] = deque([0] * kept, maxlen=kept)  # the oldest first; at rest before boot
         self._zero: int | None = None
         self._jumps: deque[int] = deque(maxlen=3)
@@ -38,7 +39,7 @@ class Motion:
         """Follow the encoder; return the change if it is a jump, else 0."""
         self._now, jumped_before = tick, tick - 1 in self._jumps
         self.raw = counts & 0xFFFFFF
-        older, old = (self._raws or [self.raw])[0], (self._raws or [self.raw])[-1]
+        older, old = (list(self._raws) or [self.raw])[-2:][0], (self._raws or [self.raw])[-1]
         change, over_two = _shortest(counts - old), _shortest(counts - older)
         self._raws.append(self.raw)
         jump = abs(change) > 8 and abs(change) * 1_000_000 > 4 * speed_limit * self._period_us
@@ -51,17 +52,25 @@ class Motion:
             self._counts.append(self._counts[-1] + (0 if jump else change))
         return change if jump else 0
 
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+    def limits(
+        self, jump: int, speed_limit: int, travel_limits: Sequence[tuple[int, int]]
+    ) -> Iterator[tuple[int, int]]:
         """Yield code and detail of each limit that is exceeded."""
         if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 100:
             yield ENCODER_JUMP, jump
-        for times in (1, 2):
-            moved, span_us = self._moved(times * self._periods), times * self._periods * self._period_us
-            if (abs(moved) - times) * 1_000_000 > speed_limit * span_us:
+        for periods, more in ((self._periods, 1), (2 * self._periods, 2), (self._long, 1)):
+            moved, span_us = self._moved(periods), periods * self._period_us
+            if (abs(moved) - more) * 1_000_000 > speed_limit * span_us:
                 yield OVER_SPEED, int(moved * 1_000_000 / span_us)
-        travel = self._travelled() - (self._zero or 0)
-        if abs(travel) > travel_limit:
-            yield OVER_TRAVEL, travel
+        for origin, limit in travel_limits:
+            travel = self._travelled() - (self._zero or 0) if origin < 0 else self._from(origin)
+            if abs(travel) > limit:
+                yield OVER_TRAVEL, travel
+
+    def _from(self, origin: int) -> int:
+        """Return where the encoder is, counted from an origin the shortest way: the middle one of three."""
+        newest = [self._raws[0]] * (3 - len(self._raws)) + list(self._raws)
+        return statistics.median_low(_shortest(raw - origin) for raw in newest)
 
     def _moved(self, periods: int) -> int:
         counts = list(self._counts)

@@ -23,7 +23,7 @@ HOST_SILENT, LINK_DOWN, STOPPED, CORRUPT_LINK, OVER_SPEED, OVER_TRAVEL, ENCODER_
 OK, UNKNOWN, READ_ONLY, OUT_OF_RANGE, NOT_IDLE, NOT_OWNER = range(6)
 BOARD, BOOT_COUNT, RESET_CAUSE, TICK, COUNTS_PER_REV, PERIOD_US = range(1, 7)
 VOLTAGE_LIMIT, SLEW, WATCHDOG, SPEED_LIMIT, TRAVEL_LIMIT, EDGE_STAMPS = range(7, 13)
-LAST_FAULT, LAST_FAULT_DETAIL, SUPPLY = 13, 14, 15
+LAST_FAULT, LAST_FAULT_DETAIL, SUPPLY, TRAVEL_ORIGIN = 13, 14, 15, 16
 
 LARGEST = 2**31 - 1
 COBS_LONGEST = 13
@@ -212,7 +212,7 @@ class Parameters:
     """The values of section 9."""
 
     def __init__(self, limits: dict[int, int], facts: dict[int, int]) -> None:
-        self._built = limits | {EDGE_STAMPS: 0}
+        self._built = limits | {EDGE_STAMPS: 0, TRAVEL_ORIGIN: -1}
         self.now = (
             {BOARD: 1, BOOT_COUNT: 0, RESET_CAUSE: 0, TICK: 0, LAST_FAULT: 0, LAST_FAULT_DETAIL: 0, SUPPLY: 0}
             | self._built
@@ -221,8 +221,9 @@ class Parameters:
         self._highest = limits | {
             SLEW: limits[SLEW] or LARGEST,
             WATCHDOG: 50,
-            EDGE_STAMPS: 0,
-        }  # no stamps here
+            EDGE_STAMPS: 0,  # no stamps here
+            TRAVEL_ORIGIN: 2**24 - 1,
+        }
 
     def restore(self) -> None:
         """Forget what a host changed."""
@@ -234,7 +235,7 @@ class Parameters:
 
     def change(self, id_: int, value: int, *, idle: bool, owner: bool) -> int:
         """Carry PARAMETER_SET out, or not; return the result."""
-        lowest = {WATCHDOG: 5, EDGE_STAMPS: 0}.get(id_, 1)
+        lowest = {WATCHDOG: 5, EDGE_STAMPS: 0, TRAVEL_ORIGIN: -1}.get(id_, 1)
         reasons = (
             (UNKNOWN, id_ not in self.now),
             (READ_ONLY, id_ not in self._highest),

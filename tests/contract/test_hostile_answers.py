@@ -61,6 +61,33 @@ def says(parameter: Parameter, value: int, result: int = 0) -> Lie:
     return lie
 
 
+def at_first(parameter: Parameter, value: int) -> Lie:
+    """Say a value until another is set: the first answer is the comparison's."""
+    left = [1]
+
+    def lie(message: Message) -> Message:
+        if isinstance(message, ParameterValue) and message.id == parameter and left:
+            left.pop()
+            return ParameterValue(parameter, value, 0)
+        return message
+
+    return lie
+
+
+def forgets(parameter: Parameter, value: int, answers: int) -> Lie:
+    """Say another value after so many answers about the parameter: what was set is not kept."""
+    heard = [0]
+
+    def lie(message: Message) -> Message:
+        if isinstance(message, ParameterValue) and message.id == parameter:
+            heard[0] += 1
+            if heard[0] > answers:
+                return ParameterValue(parameter, value, 0)
+        return message
+
+    return lie
+
+
 def every(kind: type, **fields: int | bool) -> Lie:
     return lambda message: message._replace(**fields) if isinstance(message, kind) else message  # type: ignore[arg-type]
 
@@ -111,6 +138,26 @@ def test_an_answer_that_cannot_be_is_a_sentence_and_leaves_the_device_free(lie: 
         assert bench.board.state == State.IDLE
         for _ in range(600):  # where the session could not be given back, it lapses
             bench.board.tick()
+        assert bench.board.owner == 0
+
+
+@pytest.mark.parametrize(
+    ("parameter", "answers"),
+    [
+        *((Parameter.SPEED_LIMIT_COUNTS_S, 2), (Parameter.TRAVEL_LIMIT_COUNTS, 2)),
+        *((Parameter.VOLTAGE_LIMIT_MV, 2), (Parameter.SLEW_MV_PER_MS, 2)),
+        *((Parameter.WATCHDOG_MS, 1), (Parameter.TRAVEL_ORIGIN_COUNTS, 1)),
+    ],
+)
+def test_a_limit_that_is_taken_and_not_kept_is_refused_before_arming(
+    parameter: Parameter, answers: int
+) -> None:
+    with on_bench("sim-board can", "amplifier.slew_V_s=500", "encoder.zero=3") as bench:
+        on_way_down(bench, lying(forgets(parameter, 49, answers)))
+        with pytest.raises(OpenError, match=rf"{parameter.name} was set to \d+, and reads 49") as caught:
+            bench.make().__enter__()
+        assert "\n" not in str(caught.value)
+        assert bench.board.state == State.IDLE
         assert bench.board.owner == 0
 
 
@@ -167,7 +214,7 @@ def test_the_same_supply_on_both_sides_arms() -> None:
 
 def test_a_limit_of_the_rig_as_the_message_prints_it_is_accepted() -> None:
     limits = ("supervisor.velocity_limit_rad_s=12.566", "supervisor.position_limit_rad=3.141")
-    both = says(Parameter.SPEED_LIMIT_COUNTS_S, 8192), says(Parameter.TRAVEL_LIMIT_COUNTS, 2048)
+    both = at_first(Parameter.SPEED_LIMIT_COUNTS_S, 8192), at_first(Parameter.TRAVEL_LIMIT_COUNTS, 2048)
     with on_bench("sim-board can", *limits) as bench:
         on_way_down(bench, lying(lambda message: both[1](both[0](message))))  # type: ignore[arg-type]
         with bench.make() as backend:

@@ -250,7 +250,8 @@ def test_parameters(host: Callable[..., Host]) -> None:
     assert h.get(wire.COUNTS_PER_REV) == (wire.OK, 8192)
     assert h.get(wire.PERIOD_US) == (wire.OK, 1000)
     assert h.get(wire.EDGE_STAMPS) == (wire.OK, 0)
-    assert h.get(0) == h.get(16) == (wire.UNKNOWN, 0)
+    assert h.get(wire.TRAVEL_ORIGIN) == (wire.OK, -1)
+    assert h.get(0) == h.get(17) == (wire.UNKNOWN, 0)
     assert h.get(wire.SUPPLY) == (wire.OK, 0)
     assert h.put(wire.VOLTAGE_LIMIT, 5000) == (wire.NOT_OWNER, 10_000)
     h.hello()
@@ -276,7 +277,7 @@ def test_the_next_host_finds_the_device_as_it_was_built(ready: Host, session: in
     assert ready.hello() == "o"  # the owner again: nothing changes
     assert ready.get(wire.VOLTAGE_LIMIT) == (wire.OK, 2000)
     ready.drive(release=1)
-    assert ready.get(wire.SLEW) == (wire.OK, 5)  # nobody is there whom it could disturb
+    assert ready.get(wire.SLEW) == (wire.OK, 0)  # it ends with the session
     assert ready.hello(session) == "o"
     assert ready.get(wire.VOLTAGE_LIMIT) == (wire.OK, 10_000)
     assert ready.get(wire.SLEW) == (wire.OK, 0)
@@ -496,7 +497,7 @@ def test_a_fault_is_cleared_by_two_drives_of_one_session(ready: Host) -> None:
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_speed_limit(running: Host, sign: int) -> None:
-    assert running.run(30, moved=sign * 33).state == RUN
+    assert running.run(30, moved=sign * 32).state == RUN
     assert running.run(1, 1000, moved=sign * 34).state == RUN  # may be a wrong count
     sample = running.run(1, 1000, moved=sign * 34)
     assert (sample.state, sample.fault_class) == (FAULTED, wire.OVER_SPEED)
@@ -516,6 +517,46 @@ def test_travel_limit_counts_from_the_first_arming(host: Callable[..., Host]) ->
     assert h.run(1, moved=1).state == RUN  # may be a wrong count
     assert h.run(1).fault_class == wire.OVER_TRAVEL
     assert h.fault()[2] == 301
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_low_speed_limit_shows_over_8_ms(ready: Host, sign: int) -> None:
+    assert ready.put(wire.SPEED_LIMIT, 1000) == (wire.OK, 1000)  # 8 counts in 8 ms, and one more
+    ready.arm()
+    for moved in (1, 1, 1, 1, 1, 1, 1, 1, 2) * 3:
+        assert ready.run(1, moved=sign * moved).state == RUN
+    for moved in (1, 1, 2):
+        assert ready.run(1, moved=sign * moved).state == RUN
+    assert ready.run(1, moved=sign).fault_class == wire.OVER_SPEED
+    assert abs(ready.fault()[2]) == 1250
+
+
+def test_travel_from_an_origin_that_was_given(host: Callable[..., Host]) -> None:
+    h = host(travel_limit_counts=300)
+    h.tick()
+    h.hello()
+    assert h.put(wire.TRAVEL_ORIGIN, 2**24 - 50) == (wire.OK, 2**24 - 50)
+    assert (
+        h.put(wire.TRAVEL_ORIGIN, 2**24) == h.put(wire.TRAVEL_ORIGIN, -2) == (wire.OUT_OF_RANGE, 2**24 - 50)
+    )
+    assert h.put(wire.TRAVEL_LIMIT, 60) == (wire.OK, 60)
+    h.arm()
+    assert h.run(5, moved=2).state == RUN
+    assert h.run(1, moved=1).state == RUN  # may be a wrong count
+    assert h.run(1).fault_class == wire.OVER_TRAVEL
+    assert h.fault()[2] == 61
+
+
+def test_what_the_board_was_built_with_counts_from_the_first_arming(host: Callable[..., Host]) -> None:
+    h = host(travel_limit_counts=30)
+    h.tick()
+    h.hello()
+    assert h.put(wire.TRAVEL_ORIGIN, 25) == (wire.OK, 25)
+    h.arm()
+    assert h.run(15, moved=2).state == RUN
+    assert h.run(1, moved=1).state == RUN
+    assert h.run(1).fault_class == wire.OVER_TRAVEL
+    assert h.fault()[2] == 31
 
 
 def test_the_third_jump_within_100_periods(running: Host) -> None:
@@ -563,7 +604,7 @@ def test_one_wrong_count_is_no_travel(host: Callable[..., Host]) -> None:
 
 def test_three_jumps(running: Host) -> None:
     assert running.run(1, moved=132 + 1).state == RUN
-    assert running.run(50, moved=33).state == RUN
+    assert running.run(50, moved=32).state == RUN
     assert running.run(1, moved=-8000).state == RUN
     sample = running.run(1, moved=4000)
     assert (sample.state, sample.fault_class) == (FAULTED, 7)

@@ -19,8 +19,10 @@ from tools.traces.scenarios import SCENARIOS
 from tools.traces.steps import differences
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
+
+    Limits = Sequence[tuple[int, int]]
 
 TRACES: dict[str, Any] = {
     path.stem: json.loads(path.read_text("utf-8")) for path in sorted(tool.FOLDER.glob("*.json"))
@@ -139,10 +141,11 @@ class Changed(Motion):
     travel_more = 0
     jumps = 3
 
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         while len(self._jumps) > self.jumps:
             self._jumps.popleft()
-        yield from super().limits(jump, int(speed_limit * self.speed_factor), travel_limit + self.travel_more)
+        farther = [(origin, limit + self.travel_more) for origin, limit in travel_limits]
+        yield from super().limits(jump, int(speed_limit * self.speed_factor), farther)
 
 
 class Slack(Changed):
@@ -167,11 +170,38 @@ class NoMedianOfTravel(Motion):
         return self._counts[-1]
 
 
-class OneWindow(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
-        for code, detail in super().limits(jump, speed_limit, travel_limit):
-            if code != 5 or abs(self._moved(self._periods)) - 1 > speed_limit * self._period_us * 1e-6:
+class WithoutTwice(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        for code, detail in super().limits(jump, speed_limit, travel_limits):
+            seen = (self._periods, self._long)
+            moved = [(abs(self._moved(periods)) - 1, periods) for periods in seen]
+            if code != 5 or any(m > speed_limit * p * self._period_us * 1e-6 for m, p in moved):
                 yield code, detail
+
+
+class ShortWindows(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        for code, detail in super().limits(jump, speed_limit, travel_limits):
+            spans = [(more, more * self._periods) for more in (1, 2)]
+            moved = [(abs(self._moved(periods)) - more, periods) for more, periods in spans]
+            if code != 5 or any(m > speed_limit * p * self._period_us * 1e-6 for m, p in moved):
+                yield code, detail
+
+
+class NoOrigin(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        limit = min(limit for _, limit in travel_limits)
+        yield from super().limits(jump, speed_limit, [(-1, limit)])
+
+
+class OriginOnly(Motion):
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        yield from super().limits(jump, speed_limit, travel_limits[:1])
+
+
+class NoMedianFromTheOrigin(Motion):
+    def _from(self, origin: int) -> int:
+        return ((self.raw or 0) - origin + 2**23) % 2**24 - 2**23
 
 
 class NoRepair(Motion):
@@ -193,17 +223,17 @@ class JumpsAreSpeed(Motion):
 
 
 class TwoJumps(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         if jump and len(self._jumps) >= 2 and self._now - self._jumps[-2] < 100:
             yield 7, jump
-        yield from super().limits(jump, speed_limit, travel_limit)
+        yield from super().limits(jump, speed_limit, travel_limits)
 
 
 class LongMemory(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limit: int) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 160:
             yield 7, jump
-        yield from super().limits(jump, speed_limit, travel_limit)
+        yield from super().limits(jump, speed_limit, travel_limits)
 
 
 class NewOrigin(Motion):
@@ -217,8 +247,8 @@ class SixteenBits(Motion):
 
 
 MOTIONS = (
-    *(Slack, Tight, Farther, NoMedian, NoMedianOfTravel, OneWindow, NoRepair, JumpsAreSpeed, TwoJumps),
-    *(LongMemory, NewOrigin, SixteenBits),
+    *(Slack, Tight, Farther, NoMedian, NoMedianOfTravel, WithoutTwice, NoRepair, JumpsAreSpeed, TwoJumps),
+    *(LongMemory, NewOrigin, SixteenBits, ShortWindows, NoOrigin, OriginOnly, NoMedianFromTheOrigin),
 )
 
 

@@ -205,7 +205,7 @@ uint32_t check_silence(struct dcmp_device *device, uint32_t period_us, uint32_t 
     return UINT32_MAX;
 }
 
-#define TURNED 60 /* periods before the wrong count: more than are looked back at */
+#define TURNED 200 /* periods before the wrong count: more than are looked back at */
 
 /* True count some periods after the wrong one; the counter wraps on the way there. */
 static int64_t turned(int32_t speed, int32_t period_us, int32_t after)
@@ -221,7 +221,7 @@ static uint32_t shown(int64_t count)
 static bool noticed(struct dcmp_encoder encoder, int32_t speed_limit, int32_t period_us, int32_t speed, int64_t wrong)
 {
     bool bad = false;
-    const int32_t periods = 2 * encoder.span + 3;
+    const int32_t periods = (int32_t)DCMP_POSITIONS;
     for (int32_t after = 0; after < periods && !bad; after++) {
         const int64_t count = turned(speed, period_us, after);
         const int64_t travel = count < 0 ? -count : count;

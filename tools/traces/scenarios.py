@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.wire.messages import Parameter
 from tools.traces.steps import OURS, THEIRS
 
 if TYPE_CHECKING:
@@ -143,16 +144,17 @@ def jumps(host: Recorder) -> None:
 def over_speed(host: Recorder) -> None:
     """At the limit and one count above; above it is found one tick later."""
     host.arm()
-    host.run(10, 2000, moved=33)
+    for moved in (33, 33, 33, 32, 33, 33, 33, 32, 33, 33):
+        host.run(1, 2000, moved=moved)
     host.run(1, 2000, moved=34)
     host.run(3, 2000, moved=-33)
     host.run(6, 2000, moved=-34)
 
 
 def over_speed_slow(host: Recorder) -> None:
-    """Between the limit and one count above it over 1 ms: the longer time finds it."""
+    """So far in a tick that it may be a wrong count; a count more, and it is too far for one on the way."""
     host.arm()
-    for moved in (33, 34, 33, 34, 33, 34, 34, 34):
+    for moved in (67, 0, 0, 0, 68, 0, 0):
         host.run(1, 1000, moved=moved)
 
 
@@ -170,6 +172,68 @@ def over_travel(host: Recorder) -> None:
     host.run(1, 1000, moved=30)
     host.run(1, 1000, moved=1)
     host.run(2, 1000)
+
+
+def over_speed_low(host: Recorder) -> None:
+    """Below a speed limit that a session lowered to a count in 1 ms; then a count too many in 8 ms."""
+    host.tick()
+    host.hello()
+    host.put(Parameter.SPEED_LIMIT_COUNTS_S, 1000)
+    host.rearm()
+    for moved in (0, 1, 1, 1, 1, 1, 1, 1, 2, 1, 1, 1, 1, 1, 1, 1, 0):
+        host.run(1, 500, moved=moved)
+    for moved in (2, 1, 1, 1, 2, 1, 1, 1, 2, 1):
+        host.run(1, 500, moved=-moved)
+
+
+def travel_origin(host: Recorder) -> None:
+    """Turn about an origin that is not where the device was armed, over the count's wrap."""
+    host.counts = 2**24 - 90
+    host.tick()
+    host.hello()
+    host.put(Parameter.TRAVEL_ORIGIN_COUNTS, 30)
+    host.put(Parameter.TRAVEL_LIMIT_COUNTS, 150)
+    host.rearm()
+    host.run(2, 500, moved=-15)
+    host.run(8, 500, moved=30)
+    host.run(1, 500, moved=50)
+    host.run(1, 500, moved=-50)
+    host.run(2, 500, moved=30)
+    host.run(1, 500, moved=1)
+    host.run(2, 500)
+
+
+def travel_built(host: Recorder) -> None:
+    """Give an origin on the way: what the board was built with stands, from the first arming on."""
+    host.tick()
+    host.hello()
+    host.put(Parameter.TRAVEL_ORIGIN_COUNTS, 200)
+    host.rearm()
+    host.run(10, 500, moved=30)
+    host.run(1, 500, moved=1)
+    host.run(2, 500)
+
+
+def limits_end(host: Recorder) -> None:
+    """Limits of a session end with it: the next one may do what this one may not."""
+    host.tick()
+    host.hello()
+    host.put(Parameter.VOLTAGE_LIMIT_MV, 1000)
+    host.put(Parameter.SLEW_MV_PER_MS, 600)
+    host.put(Parameter.SPEED_LIMIT_COUNTS_S, 1000)
+    host.put(Parameter.TRAVEL_LIMIT_COUNTS, 20)
+    host.put(Parameter.TRAVEL_ORIGIN_COUNTS, 3)
+    host.rearm()
+    host.run(4, 2500, moved=1)
+    host.drive(arm=False, release=True)
+    host.tick()
+    host.hello(THEIRS)
+    for _ in range(10):
+        host.drive(session=THEIRS)
+        host.tick()
+    for _ in range(4):
+        host.drive(2500, session=THEIRS)
+        host.tick(30)
 
 
 def wrap(host: Recorder) -> None:
@@ -286,6 +350,16 @@ SCENARIOS: dict[str, Scenario] = {
     "over-travel": Scenario(
         "Travel from the first arming on, over a second one.", over_travel, {"travel_limit_counts": 300}
     ),
+    "over-speed-8ms": Scenario(
+        "A speed limit of a session, too low for 1 and 2 ms: 8 ms show it.", over_speed_low
+    ),
+    "travel-origin": Scenario("Travel from an origin that a session gave.", travel_origin),
+    "travel-built": Scenario(
+        "Whatever the session's origin, the board's own limit counts from the first arming.",
+        travel_built,
+        {"travel_limit_counts": 300},
+    ),
+    "limits-end": Scenario("Limits of a session end with it.", limits_end),
     "wrap": Scenario("The count passes 2^24.", wrap),
     "stop-and-clear": Scenario("STOP; what clears a fault, and what does not.", stop_and_clear),
     "line-down": Scenario("The line hangs up in RUN and in ARMING.", line_down),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.messages import Drive, Hello, State, Stop
+from dcmp_hil.wire.messages import Drive, Hello, Parameter, ParameterSet, State, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
@@ -153,6 +153,10 @@ class Recorder:
         """Send STOP."""
         self._send(Stop(reason), f"STOP, reason {reason}")
 
+    def put(self, parameter: Parameter, value: int, session: int = OURS) -> None:
+        """Set a parameter."""
+        self._send(ParameterSet(session, parameter, value), f"PARAMETER_SET {parameter.name} {value}")
+
     def wait(self, us: int) -> None:
         """Let time pass between two ticks."""
         self._play({"wait_us": us})
@@ -179,7 +183,9 @@ class Recorder:
             self.drive(voltage_mV)
             self.tick(moved)
 
-    def _send(self, message: Drive | Hello | Stop, means: str, *, spoilt: bool = False) -> None:
+    def _send(
+        self, message: Drive | Hello | ParameterSet | Stop, means: str, *, spoilt: bool = False
+    ) -> None:
         number, data = pack(message)
         if spoilt:
             data = data[:-1] + bytes([data[-1] ^ 0x55])

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 _LARGEST = 2**31 - 1
-_UNKNOWN = (0, 16, 100, 255)
+_FIRST_ARMING = -1  # TRAVEL_ORIGIN_COUNTS that no session has set
+_UNKNOWN = (0, 17, 100, 255)
 _READ_ONLY = (
     *(Parameter.BOARD, Parameter.BOOT_COUNT, Parameter.RESET_CAUSE, Parameter.TICK),
     *(Parameter.COUNTS_PER_REV, Parameter.PERIOD_US, Parameter.LAST_FAULT, Parameter.LAST_FAULT_DETAIL),
@@ -39,6 +40,7 @@ _RANGES = {
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
     Parameter.SUPPLY_MV: (0, _LARGEST),
+    Parameter.TRAVEL_ORIGIN_COUNTS: (_FIRST_ARMING, 2**24 - 1),
 }
 
 
@@ -133,6 +135,14 @@ def ranges(client: Client) -> Iterator[str]:
         yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, slew + 1, Result.OUT_OF_RANGE)
     else:
         yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, _LARGEST, Result.OK)
+    for value, expected in (
+        (0, Result.OK),
+        (2**24, Result.OUT_OF_RANGE),
+        (2**24 - 1, Result.OK),
+        (_FIRST_ARMING - 1, Result.OUT_OF_RANGE),
+        (_FIRST_ARMING, Result.OK),
+    ):
+        yield from _tried(client, session, Parameter.TRAVEL_ORIGIN_COUNTS, value, expected)
     yield from _tried(client, session, Parameter.EDGE_STAMPS, 2, Result.OUT_OF_RANGE)
     yield from _tried(client, session, Parameter.EDGE_STAMPS, 0, Result.OK)
 

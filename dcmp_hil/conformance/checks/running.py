@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 PUSH_MV = 1000
-"""mV, for 300 ms at most: `travel-limit` alone waits for the arm to move."""
+"""mV, for 300 ms at most: `travel-limit` and `speed-limit` alone wait for the arm to move."""
 _CORRUPT_LIMIT = 10
 
 

@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from tests.firmware.bench import Bench, Core
+from tests.firmware.bench import SESSION, Bench, Core
 from tests.firmware.core_library import PREBUILT
 
 RUN, FAULT = 3, 4
+ORIGIN = 16
 OVER_SPEED, OVER_TRAVEL, ENCODER_JUMP = 5, 6, 7
 
 
@@ -49,7 +50,7 @@ def test_the_shortest_way(core: Core) -> None:
 
 
 @pytest.mark.parametrize("period", [50, 300, 1000, 1500, 45000])
-@pytest.mark.parametrize("limit", [1, 1000, 40000, 1_000_000])
+@pytest.mark.parametrize("limit", [1000, 40000, 1_000_000])
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_speed_limit(core: Core, period: int, limit: int, direction: int) -> None:
     """One count more than the speed says is allowed, two are not; one tick later."""
@@ -74,6 +75,42 @@ def test_speed_limit(core: Core, period: int, limit: int, direction: int) -> Non
         if code:
             assert bench.fault[1] == direction * (total * 1_000_000 // window)
             assert bench.output() == (0, False)
+
+
+@pytest.mark.parametrize(("period", "window"), [(50, 160), (300, 27), (1000, 8), (1500, 6), (7999, 2)])
+@pytest.mark.parametrize("limit", [1, 300, 1303, 2000])
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_a_low_speed_limit_is_found_over_8_ms(
+    core: Core, period: int, window: int, limit: int, direction: int
+) -> None:
+    """A count more than the limit is borne over 8 ms, two are not; over 1 and 2 ms neither shows."""
+    allowed = limit * window * period // 1_000_000 + 1
+    for extra, code in [(0, 0), (1, OVER_SPEED)]:
+        bench = Bench(core, period_us=period, speed_limit_counts_s=limit, watchdog_ms=50)
+        bench.arm()
+        total, done, codes = allowed + extra, 0, []
+        for i in range(1, window + 2 if code else 3 * window):
+            codes.append(_tick(bench, direction * (total * i // window - done)))
+            done = total * i // window
+        assert codes[-1] == code
+        assert set(codes[:-1]) == {0}
+        if code:
+            assert bench.fault[1] == direction * (total * 1_000_000 // (window * period))
+            assert bench.output() == (0, False)
+
+
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_a_steady_speed_at_a_low_limit_is_borne(core: Core, direction: int) -> None:
+    """2 rad/s of 4096 counts, wherever the arm is between two counts; 15 % more is found."""
+    for phase in range(10):
+        for share, code in [(1.0, 0), (1.15, OVER_SPEED)]:
+            bench = Bench(core, speed_limit_counts_s=1303)
+            bench.arm()
+            start, last = bench.counts, 0
+            for i in range(200):
+                now = start + direction * int(share * 1.303 * i + phase / 10)
+                last = _tick(bench, now - bench.counts)
+            assert last == code
 
 
 def test_a_steady_speed_at_the_limit_is_borne(core: Core) -> None:
@@ -114,6 +151,89 @@ def test_travel_counts_from_the_first_arming(core: Core) -> None:
         bench.drive()
         bench.tick()
     assert bench.fault == (OVER_TRAVEL, 110)
+
+
+def _from_origin(core: Core, origin: int, start: int = 0, **config: Any) -> Bench:
+    bench = Bench(core, boot=False, **config)
+    bench.counts = start
+    bench.tick()
+    bench.hello()
+    answer = bench.ask("PARAMETER_SET", session=SESSION, id=ORIGIN, value=origin)
+    assert answer["result"] == 0
+    return bench
+
+
+@pytest.mark.parametrize("start", [300, (1 << 24) - 40, (1 << 23) + 17])
+@pytest.mark.parametrize("from_origin", [0, 60, -60])
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_travel_counts_from_an_origin_that_was_given(
+    core: Core, start: int, from_origin: int, direction: int
+) -> None:
+    """Armed anywhere, an arm may go as far from the origin as the limit says, either way."""
+    bench = _from_origin(core, (start - from_origin) % (1 << 24), start)
+    assert bench.ask("PARAMETER_SET", session=SESSION, id=11, value=100)["result"] == 0
+    bench.arm()
+    way = 100 - direction * from_origin
+    for _ in range(way // 20):
+        assert _tick(bench, direction * 20) == 0
+    for _ in range(5):
+        assert _tick(bench) == 0
+    assert _tick(bench, direction) == 0
+    assert _tick(bench) == OVER_TRAVEL
+    assert bench.fault[1] == direction * 101
+
+
+def test_an_arm_that_is_too_far_from_the_origin_does_not_run(core: Core) -> None:
+    for origin, code in [(100, 0), (101, OVER_TRAVEL)]:
+        bench = _from_origin(core, origin)
+        bench.ask("PARAMETER_SET", session=SESSION, id=11, value=100)
+        for _ in range(10):
+            bench.drive()
+            bench.tick()
+        assert bench.fault == (code, -101 if code else 0)
+
+
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_one_wrong_count_is_no_travel_from_the_origin(core: Core, direction: int) -> None:
+    for wrong in (30, 5000, 1 << 22):
+        bench = _from_origin(core, 0)
+        bench.ask("PARAMETER_SET", session=SESSION, id=11, value=10)
+        bench.arm()
+        assert _tick(bench, direction * wrong) == 0
+        assert _tick(bench, -direction * wrong) == 0
+        for _ in range(5):
+            assert _tick(bench) == 0
+
+
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_no_origin_leads_beyond_what_the_board_was_built_with(core: Core, direction: int) -> None:
+    """A session may call any count its origin; what the board was built with counts from the first arming."""
+    bench = _from_origin(core, direction * 300 % (1 << 24), travel_limit_counts=500)
+    bench.arm()
+    for _ in range(25):
+        assert _tick(bench, direction * 20) == 0
+    assert _tick(bench, direction) == 0
+    assert _tick(bench) == OVER_TRAVEL
+    assert bench.fault[1] == direction * 501
+
+
+def test_the_travel_of_a_session_is_looked_at_first(core: Core) -> None:
+    """Both limits are passed in one tick."""
+    bench = _from_origin(core, 5, travel_limit_counts=30)
+    bench.arm()
+    for step, code in [(-25, 0), (-30, 0), (0, OVER_TRAVEL)]:
+        assert _tick(bench, step) == code
+    assert bench.fault[1] == -60
+
+
+@pytest.mark.parametrize("first", [7, 5000, (1 << 24) - 3])
+def test_distance_is_the_middle_one_of_three_counts(core: Core, first: int) -> None:
+    """Before the first count there is none."""
+    encoder = core.new("struct dcmp_encoder *")
+    core.lib.dcmp_encoder_init(encoder, 1000)
+    for moved, distance in [(0, 0), (40, 0), (80, 40), (50, 50), (50, 50), (-(1 << 23), 50), (-7, -7)]:
+        core.lib.dcmp_encoder_tick(encoder, (first + moved) % (1 << 32), 1 << 30, 1000)
+        assert core.lib.dcmp_encoder_distance(encoder, first % (1 << 24)) == distance
 
 
 def test_reports_stop_at_32_bits(core: Core) -> None:
@@ -281,13 +401,17 @@ def test_two_wrong_counts_in_a_row_show_at_10_khz(core: Core) -> None:
 
 
 def test_the_shortest_period_looks_back_as_far(core: Core) -> None:
-    """Twice 20 periods from each of three ticks; over 20 periods nothing is too fast."""
+    """160 periods from each of three ticks; over 20 and 40 periods nothing is too fast."""
     encoder = core.new("struct dcmp_encoder *")
-    for farthest, too_fast in [(83, True), (82, False)]:
+    for farthest, speed in [(322, 40_250), (321, 0)]:  # 1 more than the limit, and 2
         core.lib.dcmp_encoder_init(encoder, 50)
-        for ago, position in [(0, 83), (1, 83), (2, farthest), (20, 42), (21, 42), (22, 42), (40, 83)]:
+        for i in range(len(encoder.past)):
+            encoder.past[i] = 322
+        encoder.past[-2 % len(encoder.past)] = farthest
+        for ago, position in [(160, 0), (161, 400), (162, 0)]:
             encoder.past[-ago % len(encoder.past)] = position
-        assert core.lib.dcmp_encoder_too_fast(encoder, 40_000) == too_fast
+        assert core.lib.dcmp_encoder_too_fast(encoder, 40_000) == (speed > 0)
+        assert core.lib.dcmp_encoder_speed(encoder, 40_000) == speed
 
 
 @pytest.mark.parametrize("direction", [-1, 1])

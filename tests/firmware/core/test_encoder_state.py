@@ -8,12 +8,15 @@ LIMIT, PERIOD = 40_000, 1000
 ENCODER_JUMP = 7
 
 
-def test_speed_is_taken_over_a_millisecond_or_more(core: Core) -> None:
+def test_speed_is_taken_over_1_and_2_and_8_ms_or_more(core: Core) -> None:
     encoder = core.new("struct dcmp_encoder *")
-    for period in (*range(50, 1100), 45_000, 100_000):
+    for period in (*range(50, 1100), 4000, 7999, 8000, 45_000, 100_000):
         core.lib.dcmp_encoder_init(encoder, period)
-        assert encoder.span == -(-1000 // period)
-        assert encoder.window_us == encoder.span * period
+        brief, full = -(-1000 // period), -(-8000 // period)
+        found = [(window.periods, window.spare, window.us) for window in encoder.windows]
+        wanted = [(brief, 1), (2 * brief, 2), (full, 1)]
+        assert found == [(periods, spare, periods * period) for periods, spare in wanted]
+        assert max(brief, full) + 3 <= len(encoder.past)
 
 
 def test_position_is_the_middle_one_of_three(core: Core) -> None:

@@ -11,9 +11,14 @@ if TYPE_CHECKING:
 
     from tests.firmware.bench import Core
 
+WINDOWS = {
+    f".windows[{i}].{field}": value
+    for i, window in enumerate(((4, 1, 1200), (8, 2, 2400), (27, 1, 8100)))
+    for field, value in zip(("periods", "spare", "us"), window, strict=True)
+}
 BEGINNINGS: dict[str, tuple[str, tuple[int, ...], dict[str, int]]] = {
     "dcmp_amplifier": ("dcmp_amplifier_cut", (), {}),
-    "dcmp_encoder": ("dcmp_encoder_init", (300,), {".span": 4, ".window_us": 1200}),
+    "dcmp_encoder": ("dcmp_encoder_init", (300,), WINDOWS),
     "dcmp_health": ("dcmp_health_init", (), {}),
     "dcmp_history": ("dcmp_history_init", (), {}),
     "dcmp_session": ("dcmp_session_end", (), {}),

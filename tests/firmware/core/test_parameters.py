@@ -20,8 +20,17 @@ BUILT = {
     13: 5,
     14: -41234,
     15: 24000,
+    16: -1,
 }
-RANGES = {7: (1, 10000), 8: (1, TOP), 9: (5, 50), 10: (1, 40000), 11: (1, 20000), 12: (0, 1)}
+RANGES = {
+    7: (1, 10000),
+    8: (1, TOP),
+    9: (5, 50),
+    10: (1, 40000),
+    11: (1, 20000),
+    12: (0, 1),
+    16: (-1, (1 << 24) - 1),
+}
 
 
 def _set(bench: Bench, number: int, value: int, session: int = SESSION) -> tuple[int, int]:
@@ -77,7 +86,7 @@ def test_who_may_and_when(core: Core) -> None:
     assert _set(bench, 9, 30, session=9) == (NOT_OWNER, 20)
     assert _set(bench, 0, 30) == (UNKNOWN, 0)
     assert _set(bench, 15, 30) == (READ_ONLY, 24000)
-    assert _set(bench, 16, 30) == (UNKNOWN, 0)
+    assert _set(bench, 17, 30) == (UNKNOWN, 0)
     for number in (*range(1, 7), 13, 14):
         assert _set(bench, number, BUILT[number]) == (READ_ONLY, BUILT[number])
     for state in (2, 3, 4):
@@ -95,18 +104,25 @@ def test_the_first_reason_is_answered(core: Core) -> None:
     assert _set(bench, 9, 30, session=9) == (NOT_IDLE, 20)
 
 
-def test_a_new_owner_finds_the_board_as_it_was_built(core: Core) -> None:
+@pytest.mark.parametrize("way", ["release", "lease"])
+def test_what_a_session_changed_ends_with_it(core: Core, way: str) -> None:
+    """The board is as it was built, before anybody else owns it and after."""
     bench = Bench(core, slew_mV_per_ms=200)
     bench.hello()
     for number, (low, _) in RANGES.items():
         assert _set(bench, number, max(low, 1)) == (OK, max(low, 1))
     bench.tick(5)
     bench.hello()
-    assert bench.ask("PARAMETER_GET", id=7)["value"] == 1  # the same one
-    bench.drive(arm=0, release=1)
-    bench.hello(9)
-    for number, value in {**BUILT, 4: bench.device.tick, 8: 200}.items():
-        assert bench.ask("PARAMETER_GET", id=number)["value"] == value
+    for number, (low, _) in RANGES.items():
+        assert bench.ask("PARAMETER_GET", id=number)["value"] == max(low, 1)  # the same session
+    if way == "release":
+        bench.drive(arm=0, release=1)
+    else:
+        bench.tick(500)
+    for owner in (0, 9):
+        assert not bench.hello(owner)["busy"]
+        for number, value in {**BUILT, 4: bench.device.tick, 8: 200}.items():
+            assert bench.ask("PARAMETER_GET", id=number)["value"] == value
 
 
 def test_lowered_limits_hold(core: Core) -> None:

@@ -1,0 +1,115 @@
+"""Parameters of a device: read, and the limits of a run put into it for a session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.backends import refusals
+from dcmp_hil.backends.caller import PATIENCE
+from dcmp_hil.backends.comparison import COMPARED, is_possible
+from dcmp_hil.wire.counters import nearest
+from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, ParameterValue, Result
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dcmp_hil.backends.caller import Caller
+    from dcmp_hil.backends.terms import Terms
+
+_LOOKS = 3  # at a count before it is taken for the arm's
+_COUNTS = 2**24  # of a SAMPLE
+
+
+class Parameters:
+    """Those of one device, for one session.
+
+    Parameters
+    ----------
+    name
+        Of the link, for what is refused.
+    caller
+        On that link.
+    session
+        That owns the device when something is set.
+    """
+
+    def __init__(self, name: str, caller: Caller, session: int) -> None:
+        self._name, self._caller, self._session = name, caller, session
+
+    def get(self, parameter: Parameter) -> int:
+        """Return a value that is possible on any device.
+
+        Raises
+        ------
+        OpenError
+            If there is no answer, or one that cannot be.
+        """
+        found = self._ask(ParameterGet(parameter))
+        if found is None or found.result != Result.OK:
+            raise refusals.not_told(self._name, parameter.name)
+        if not is_possible(parameter, found.value):
+            raise refusals.impossible(self._name, f"{parameter.name} = {found.value}")
+        return found.value
+
+    def compared(self) -> dict[Parameter, int]:
+        """Return what a rig is held against."""
+        return {parameter: self.get(parameter) for parameter in COMPARED}
+
+    def put_limits(self, terms: Terms, built: Mapping[Parameter, int]) -> int:
+        """Lower the device's limits to the rig's, and read back that it keeps them.
+
+        They are the session's: they end with it. Never more is set than the board was built with.
+
+        Parameters
+        ----------
+        terms
+            What the rig says.
+        built
+            What the device said before anything was set.
+
+        Returns
+        -------
+        int
+            Count modulo 2^24 at which the arm hangs, from which travel counts.
+
+        Raises
+        ------
+        OpenError
+            If the device does not take a value, or does not keep it.
+        """
+        speed, travel = Parameter.SPEED_LIMIT_COUNTS_S, Parameter.TRAVEL_LIMIT_COUNTS
+        zero = self._hanging() if terms.zero is None else terms.zero % _COUNTS
+        asked = {
+            Parameter.WATCHDOG_MS: terms.watchdog_ms,
+            Parameter.VOLTAGE_LIMIT_MV: terms.voltage_limit_mV,
+            speed: min(terms.speed_limit_counts_s, built[speed]),
+            travel: min(terms.travel_limit_counts, built[travel]),
+            Parameter.TRAVEL_ORIGIN_COUNTS: zero,
+        }
+        if terms.slew_mV_per_ms is not None:
+            asked[Parameter.SLEW_MV_PER_MS] = terms.slew_mV_per_ms
+        for parameter, value in asked.items():
+            self._put(parameter, value)
+        for parameter, value in asked.items():
+            kept = self.get(parameter)
+            if kept != value:
+                raise refusals.not_kept(self._name, parameter.name, value, kept)
+        return zero
+
+    def _put(self, parameter: Parameter, value: int) -> None:
+        found = self._ask(ParameterSet(self._session, parameter, value))
+        if found is None or found.result != Result.OK or found.value != value:
+            raise refusals.not_taken(self._name, parameter.name, value, found)
+
+    def _hanging(self) -> int:
+        """Return the count of an arm that hangs now: the middle one of three, so that a wrong one is none."""
+        counts: list[int] = []
+        while len(counts) < _LOOKS:
+            sample = self._caller.hear_sample(PATIENCE)
+            if sample is None:
+                raise refusals.no_samples(self._name, PATIENCE, "nothing")
+            counts.append(nearest(counts[0] if counts else 0, sample.position_counts, 24))
+        return sorted(counts)[_LOOKS // 2] % _COUNTS
+
+    def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
+        return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)
