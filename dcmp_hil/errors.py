@@ -108,3 +108,9 @@ class DeadlineError(DcmpError):
     """Deadlines were missed under `timing.overrun = "stop"`, or cannot be promised under "enforce"."""
 
     exit_code = 5
+
+
+class IncompleteError(DcmpError):
+    """A recording lacks something, or could not be checked; what is right in it was used."""
+
+    exit_code = 6

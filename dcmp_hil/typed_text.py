@@ -14,4 +14,7 @@ def readable(text: str) -> str:
     text
         An argument, or a message that holds one.
     """
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    except UnicodeEncodeError:  # half a pair, as JSON may name it: no byte of a command line
+        return text.encode("utf-8", "replace").decode("utf-8")

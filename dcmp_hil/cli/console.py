@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
-from dcmp_hil.cli.outputs import write_text
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.whole_file import write_text
 
 if TYPE_CHECKING:
     from dcmp_hil.errors import DcmpError

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.whole_file import is_special, real
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-_SUFFIX = 16  # characters of a name's ending that are kept
 _REMEDY = "Choose a file you may write, in a folder that exists."
 
 
@@ -32,7 +32,7 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         With a sentence for each place that cannot be written, or that another one is already.
     """
     faults: list[str] = []
-    taken = {_real(path): f"is {what} itself" for what, path in (inputs or {}).items()}
+    taken = {real(path): f"is {what} itself" for what, path in (inputs or {}).items()}
     for option, path in places.items():
         if path is None:
             continue
@@ -40,10 +40,10 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         if reason:
             faults.append(f"{option} {path}: {reason}. {_REMEDY}")
             continue
-        place = _real(path)
+        place = real(path)
         if place in taken:
             faults.append(f"{option} {path}: {taken[place]}. Write elsewhere.")
-        if not _is_special(path):
+        if not is_special(path):
             taken[place] = f"is where {option} goes, too"
     if faults:
         raise ConfigError(*faults)
@@ -57,7 +57,7 @@ def try_folder(option: str, folder: Path) -> None:
     ConfigError
         If not.
     """
-    place = _real(folder)
+    place = real(folder)
     try:
         while not place.exists():
             place = place.parent
@@ -95,46 +95,12 @@ def write_each(jobs: Sequence[tuple[Path | None, Callable[[Path], None]]]) -> tu
     return written, faults
 
 
-def place_beside(path: Path) -> Path | None:
-    """Return a name in the same folder, for a file that is to take the place of `path` at once.
-
-    None where that cannot be: for a device or a pipe, or a folder in which no file can be made.
-    """
-    place = _real(path)
-    if _is_special(path) or not os.access(place.parent, os.W_OK | os.X_OK):
-        return None
-    return place.with_name(f".{os.getpid()}{place.suffix[:_SUFFIX]}.part")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file so that it holds what it did before, or all of `text`.
-
-    Raises
-    ------
-    OSError, ValueError
-        If it cannot be written.
-    """
-    beside = place_beside(path)
-    if beside is None:
-        path.write_text(text, encoding="utf-8")
-        return
-    place = _real(path)
-    try:
-        beside.write_text(text, encoding="utf-8")
-        if place.exists():
-            beside.chmod(stat.S_IMODE(place.stat().st_mode))
-        beside.replace(place)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-
-
 def _fault(path: Path) -> str:
     """Return why a file could not be written; nothing if it could."""
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
-        return _fault_of_folder(_real(path).parent)
+        return _fault_of_folder(real(path).parent)
     except (OSError, ValueError) as error:  # ValueError: a NUL
         return _words(error)
     if stat.S_ISDIR(mode):
@@ -152,19 +118,6 @@ def _fault_of_folder(folder: Path) -> str:
     if not stat.S_ISDIR(mode):
         return f"{folder} is no folder"
     return "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} may not be written"
-
-
-def _real(path: Path) -> Path:
-    """Return where links lead; the path itself where the current folder is gone."""
-    try:
-        return Path(os.path.realpath(path))
-    except (OSError, ValueError):
-        return path
-
-
-def _is_special(path: Path) -> bool:
-    """Return whether something is there that is no ordinary file: a device, a pipe."""
-    return path.exists() and not path.is_file()
 
 
 def _words(error: OSError | ValueError) -> str:

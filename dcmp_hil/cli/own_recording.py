@@ -11,7 +11,7 @@ from rich.table import Table
 from dcmp_hil.cli import console
 from dcmp_hil.cli.outputs import json_place, try_places, write_each
 from dcmp_hil.config import load_table
-from dcmp_hil.errors import ConfigError
+from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
 from dcmp_hil.recording.again import run_again
 from dcmp_hil.recording.compare import compare
@@ -46,8 +46,7 @@ def write_exports(file: Path, *, csv: Path | None, parquet: Path | None, rrd: Pa
     written, faults = write_each([(path, partial(write, run)) for path, write in targets])
     for path in written:
         console.note(f"wrote {path}")
-    if faults:
-        raise ConfigError(*faults)
+    _end(run, faults)
 
 
 def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
@@ -71,7 +70,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
     try_places(places, {"the recording": recording_in(file)})
     run = _read(file)
     if not len(run.rows):
-        raise ConfigError(f"{run.path}: no period is in it.")
+        raise _incomplete(run) if run.damage else ConfigError(f"{run.path}: no period is in it.")
     _tell_faults(run)
     keys, start = given.keys(), given.figures.get("start") or 0.0
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
@@ -95,16 +94,36 @@ def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
     for path in written:
         if path != json_file:
             console.note(f"wrote {path}")
-    if faults:
-        raise ConfigError(*faults)
+    _end(run, faults)
 
 
 def _read(file: Path) -> RecordedRun:
+    """Read a recording; tell what is wrong with it before anything is made of it."""
     run = read_run(file)
-    if not run.complete:
-        last = f"{run.rows[-1, 0]:.3f} s" if len(run.rows) else "its beginning"
-        console.warn(f"{run.path} was cut off: it ends at {last}, and what is there is right.")
+    for sentence in (*run.damage, *run.unchecked):
+        console.warn(f"{run.path}: {sentence}.")
     return run
+
+
+def _end(run: RecordedRun, faults: Sequence[str]) -> None:
+    """End with the code that says what could not be written, or what the recording lacks.
+
+    Raises
+    ------
+    ConfigError, IncompleteError
+        If so, after everything that can be written was.
+    """
+    if faults:
+        raise ConfigError(*faults)
+    if run.damage:
+        raise _incomplete(run)
+
+
+def _incomplete(run: RecordedRun) -> IncompleteError:
+    return IncompleteError(
+        f"{run.path} is incomplete or damaged: the warnings say where. What was made of it holds the "
+        f"{len(run.rows)} periods that are right."
+    )
 
 
 def _tell_faults(run: RecordedRun) -> None:

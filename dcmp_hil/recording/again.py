@@ -72,7 +72,7 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
     past = _Past(recorded, trajectory, rig.delay)
     mailbox = Mailbox()
     changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_nobody)
-    made = deque(changes_in(recorded.events, rig))
+    made = deque(changes_in(recorded.events, rig, whole=not recorded.damage))
     estimates, demands = [], []
     for row in recorded.rows.tolist():
         sample = Sample(row[0], row[1], row[2], int(row[3]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.settable import changed
 from dcmp_hil.values import ChangeData
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 
-def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
+def changes_in(events: Sequence[Event], rig: Rig, *, whole: bool = True) -> list[tuple[float, Change]]:
     """Return each change with the device time of the period after which it was made, s.
 
     Parameters
@@ -25,6 +26,8 @@ def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
         Of the run.
     rig
         As the run began.
+    whole
+        Whether no event is missing: else a change that does not fit is left out.
 
     Raises
     ------
@@ -36,6 +39,11 @@ def changes_in(events: Sequence[Event], rig: Rig) -> list[tuple[float, Change]]:
         if isinstance(event.data, ChangeData) and event.data.values:
             # JSON's numbers and texts are TOML's, and come back to the bit.
             overrides = [f"{key}={json.dumps(value)}" for key, value in event.data.values.items()]
-            rig, change = changed(rig, overrides)
+            try:
+                rig, change = changed(rig, overrides)
+            except ConfigError:
+                if whole:
+                    raise
+                continue
             found.append((event.t, change))
     return found

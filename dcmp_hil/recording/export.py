@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import csv
-import math
+import json
 from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.signals import columns, names
+from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
     import numpy as np
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.again import Again
     from dcmp_hil.recording.reader import RecordedRun
 
-_ROWS = 4096  # a block of a Rerun recording
+_ROW_GROUP = 1 << 16  # rows of a row group
 _TWICE = (  # what a replay says a second time
     "position_estimate_rad",
     "velocity_estimate_rad_s",
@@ -33,56 +34,70 @@ _TWICE = (  # what a replay says a second time
 
 def to_csv(run: RecordedRun, path: Path) -> None:
     """Write every signal, one row a period; numbers come back to the bit."""
-    table = run.columns
-    with _writing(path), path.open("w", newline="", encoding="utf-8") as file:
+    with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(table)
-        for row in zip(*(column.tolist() for column in table.values()), strict=True):
-            writer.writerow("" if value != value else repr(value) for value in row)
+        writer.writerow(names())
+        for block in run.blocks():
+            _write_rows(writer, columns(block).values())
 
 
 def to_parquet(run: RecordedRun, path: Path) -> None:
     """Write every signal as a column of doubles, and what the run was as metadata of the file."""
     pyarrow: Any = import_module("pyarrow")  # neither has types
     parquet: Any = import_module("pyarrow.parquet")
-    table = pyarrow.table(run.columns)
-    with _writing(path), path.open("wb") as file:  # given a path, pyarrow removes it where it cannot write
-        parquet.write_table(table.replace_schema_metadata(run.run), file)
+    said = {**run.run, "complete": str(run.complete).lower(), "missing": json.dumps(run.gaps)}
+    schema = pyarrow.schema([(name, pyarrow.float64()) for name in names()], metadata=said)
+    with (
+        _writing(path) as place,
+        place.open("wb") as file,  # given a path, pyarrow removes it where it cannot write
+        parquet.ParquetWriter(file, schema) as writer,
+    ):
+        for block in run.blocks(_ROW_GROUP):
+            writer.write_table(pyarrow.table(columns(block), schema=schema))
 
 
 def to_rrd(run: RecordedRun, path: Path) -> None:
     """Write the dashboard of the run."""
     from dcmp_hil.telemetry.rerun_sink import RerunSink
 
-    with _writing(path):
-        sink = RerunSink(view_of(run.rig), path, "none")
+    with _writing(path) as place:
+        sink = RerunSink(view_of(run.rig), place, "none")
         for event in run.events:
             sink.event(event)
-        for first in range(0, len(run.rows), _ROWS):
-            sink.block(Block(run.rows[first : first + _ROWS], run.rig.model.values()))
+        for block in run.blocks():
+            sink.block(block)
         sink.close()
 
 
 def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
     """Write what observer and controller said then and now, one row a period."""
-    table = {name: run.columns[name] for name in ("time_s", *_TWICE)} | {
-        f"{name}_again": values for name, values in _now(again).items()
-    }
-    with _writing(path), path.open("w", newline="", encoding="utf-8") as file:
+    wanted = ("time_s", *_TWICE)
+    now = tuple(_now(again).values())
+    with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(table)
-        for row in zip(*(column.tolist() for column in table.values()), strict=True):
-            writer.writerow("" if math.isnan(value) else repr(value) for value in row)
+        writer.writerow((*wanted, *(f"{name}_again" for name in _TWICE)))
+        first = 0
+        for block in run.blocks():
+            then, end = columns(block), first + len(block)
+            _write_rows(writer, (*(then[name] for name in wanted), *(values[first:end] for values in now)))
+            first = end
 
 
 def again_to_rrd(run: RecordedRun, again: Again, path: Path) -> None:
     """Write what observer and controller said then and now as a Rerun recording, one plot a signal."""
     from dcmp_hil.telemetry.series import write_series
 
-    plots = {name: {"recorded": run.columns[name], "again": values} for name, values in _now(again).items()}
-    time = run.columns["time_s"]
-    with _writing(path):
-        write_series(path, "dcmp-hil replay", time - time[0], plots)
+    then = run.columns
+    plots = {name: {"recorded": then[name], "again": values} for name, values in _now(again).items()}
+    time = then["time_s"]
+    with _writing(path) as place:
+        write_series(place, "dcmp-hil replay", time - time[0], plots)
+
+
+def _write_rows(writer: Any, table: Iterable[NDArray[np.float64]]) -> None:
+    """Write columns as rows; a number that is none is an empty field."""
+    for row in zip(*(column.tolist() for column in table), strict=True):
+        writer.writerow("" if value != value else repr(value) for value in row)
 
 
 def _now(again: Again) -> dict[str, NDArray[np.float64]]:
@@ -90,9 +105,11 @@ def _now(again: Again) -> dict[str, NDArray[np.float64]]:
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def _writing(path: Path) -> Iterator[Path]:
+    """Yield where to write a file that appears wholly or not at all."""
     try:
-        yield
+        with whole_file(path) as place:
+            yield place
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
     except RuntimeError as error:  # Rerun's, of a disk that is full

@@ -9,6 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.config.text import parse_value
+from dcmp_hil.typed_text import readable
 from dcmp_hil.values import ChangeData, Event, EventKind, LinkData, PhaseData
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Level
 
 _APPLIED = re.compile(r"(.*), applied at t = [0-9.]+ s")
-_ONE = re.compile(r"([a-z_]+\.\w+)(?:: .*? -> | = )(.*?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
+_ONE = re.compile(r"([a-z_]+\.\w+)(?:: .{0,200}? -> | = )(.{0,200}?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
 _LOWERING = "lowering the arm"
 _LEVELS: Mapping[str, Level] = {"INFO": "INFO", "WARN": "WARN", "ERROR": "ERROR"}
 
@@ -31,13 +32,13 @@ def event_of_format_1(document: Mapping[str, Any]) -> Event:
         If something is missing, or it is no event of that format.
     """
     try:
-        t, name, text = float(document["t"]), document["name"], str(document["message"])
+        t, name, text = float(document["t"]), document["name"], readable(str(document["message"]))
         if name == "PHASE":
             return Event(t, "INFO", EventKind.PHASE, text, PhaseData(text))
         if name == "LINK":
             return Event(t, "DEBUG", EventKind.LINK, text, LinkData(_counters(text)))
         level = _LEVELS[name]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ValueError("an event that this version cannot read") from error
     if text == _LOWERING:
         return Event(t, level, EventKind.LOWERING, text)

@@ -5,24 +5,26 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.typed_text import readable
 from dcmp_hil.values import DATA, Event, EventKind, Level
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
 PROFILE, LIBRARY = "ros2", "dcmp-hil"
 FORMAT, FORMAT_1 = "2", "1"
 """Of what is said about a run; a number that this version does not know is refused. In format 1 an event had
-no kind and no data: see `recording.format_1`."""
+no kind, no data (see `recording.format_1`) and no number, and what is said of a run was under no checksum."""
 CYCLES, EVENTS = "/cycles", "/events"
-RUN, RIG, SUMMARY = "run", "rig.json", "summary"
-"""Names of the metadata that say what the run was, of the attached rig, and of what is known at its end."""
+RUN, ABOUT, RIG, END = "run", "run.json", "rig.json", "end.json"
+"""Names of the metadata that say what the run was; of the attachments that say it under a checksum, of the
+rig, and of what is known at the end."""
 
 _UNITS = {
     "t": "s", "began": "s", "period": "s", "lateness": "s", "compute": "s", "fault": "",
@@ -31,6 +33,7 @@ _UNITS = {
 _HEADER = b"\0\1\0\0"  # of CDR: little endian
 _LEVELS: dict[Level, int] = {"DEBUG": 1, "INFO": 2, "WARN": 3, "ERROR": 4}  # of foxglove.Log
 _FROM_LEVELS = {number: level for level, number in _LEVELS.items()}
+_LONGEST_TEXT = 10_000  # characters
 _ADAPTERS = {kind: TypeAdapter(data) for kind, data in DATA.items()}
 
 
@@ -66,11 +69,6 @@ def to_bytes(rows: NDArray[np.float64]) -> list[bytes]:
     return [_HEADER + row.tobytes() for row in rows.astype("<f8", copy=False)]
 
 
-def to_row(message: bytes) -> NDArray[np.float64]:
-    """Return the row in a message, shape (len(FIELDS),)."""
-    return np.frombuffer(message, "<f8", offset=len(_HEADER))
-
-
 def event_to_bytes(event: Event, at_ns: int) -> bytes:
     """Return an event as JSON.
 
@@ -84,7 +82,7 @@ def event_to_bytes(event: Event, at_ns: int) -> bytes:
     document: dict[str, Any] = {
         "timestamp": {"sec": at_ns // 10**9, "nsec": at_ns % 10**9},
         "level": _LEVELS[event.level],
-        "message": event.text,
+        "message": event.text[:_LONGEST_TEXT],
         "name": event.kind.value,
         "data": event.data._asdict() if event.data else None,
         "t": event.t,
@@ -102,12 +100,12 @@ def event_from(document: Mapping[str, Any]) -> Event:
     """
     try:
         t, level = float(document["t"]), _FROM_LEVELS[document["level"]]
-        name, text, data = document["name"], str(document["message"]), document["data"]
+        name, text, data = document["name"], readable(str(document["message"])), document["data"]
         if name not in set(EventKind):
             return Event(t, level, EventKind.OTHER, text)
         kind = EventKind(name)
         if kind not in _ADAPTERS:
             return Event(t, level, kind, text)
         return Event(t, level, kind, text, _ADAPTERS[kind].validate_python(data))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ValueError("an event that this version cannot read") from error

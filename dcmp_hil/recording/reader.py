@@ -1,32 +1,44 @@
-"""Reading a recording back, whole or cut off anywhere."""
+"""Reading a recording back, whole or damaged anywhere: what is returned was checked, the rest is told."""
 
 from __future__ import annotations
 
 import json
+import os
+import stat
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from mcap.records import Attachment, Footer, Message, Metadata
-from mcap.stream_reader import StreamReader
 from pydantic import ValidationError
 
 from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.format_1 import event_of_format_1
-from dcmp_hil.recording.layout import FORMAT, FORMAT_1, RIG, RUN, event_from, to_row
+from dcmp_hil.recording.layout import ABOUT, CYCLES, END, EVENTS, FORMAT, FORMAT_1, RIG, RUN, event_from
+from dcmp_hil.recording.messages import Messages
+from dcmp_hil.recording.order import Gap, in_order
+from dcmp_hil.recording.records import Op, RecordError, counts_in, metadata_in
+from dcmp_hil.recording.scanner import Damage, Scanner, attachment_of
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.signals import columns
+from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
     from typing import IO
 
+    import numpy as np
     from numpy.typing import NDArray
 
+    from dcmp_hil.recording.scanner import Record
     from dcmp_hil.values import Event
+
+_MOST_TOLD = 20  # sentences
+_LONGEST = 10_000  # characters of what is said of a run
+_OLDER = (
+    "it has the older layout: what it says of its run (version, note, faults) is under no checksum, and "
+    "whether an event is missing is known only where the file ended properly"
+)
 
 
 @dataclass(frozen=True)
@@ -42,11 +54,17 @@ class RecordedRun:
     run
         What is known of the run: version, protocol, host, note.
     rows
-        Every period, shape (n, len(FIELDS)), as it was in the ring.
+        Every period that is there and right, shape (n, len(FIELDS)), as it was in the ring.
     events
         What happened, in order.
     complete
-        False where the file ends too soon; what is there is right all the same.
+        True only if everything was checked and nothing is missing.
+    gaps
+        Periods that are missing.
+    damage
+        What is wrong with the file, a sentence each; empty where nothing is.
+    unchecked
+        What this layout has no checksum for, a sentence each.
     """
 
     path: Path
@@ -55,6 +73,9 @@ class RecordedRun:
     rows: NDArray[np.float64]
     events: tuple[Event, ...]
     complete: bool
+    gaps: tuple[Gap, ...] = ()
+    damage: tuple[str, ...] = ()
+    unchecked: tuple[str, ...] = ()
 
     @property
     def block(self) -> Block:
@@ -66,6 +87,12 @@ class RecordedRun:
         """Every signal of the table, shape (n,), by name with unit."""
         return columns(self.block)
 
+    def blocks(self, rows: int = 4096) -> Iterator[Block]:
+        """Yield the periods in blocks of so many rows at most."""
+        model = self.rig.model.values()
+        for first in range(0, len(self.rows), rows):
+            yield Block(self.rows[first : first + rows], model)
+
 
 def recording_in(path: Path) -> Path:
     """Return the recording that a path means: the file itself, or the one in a run's folder."""
@@ -73,7 +100,7 @@ def recording_in(path: Path) -> Path:
 
 
 def read_run(path: Path) -> RecordedRun:
-    """Read a recording.
+    """Read a recording; nothing that it names is imported or opened.
 
     Raises
     ------
@@ -82,85 +109,174 @@ def read_run(path: Path) -> RecordedRun:
     """
     path = recording_in(path)
     try:
-        with path.open("rb") as file:
-            return _read(path, file)
-    except OSError as error:
+        with open(path, "rb", opener=_opened) as file:
+            known = os.fstat(file.fileno())
+            if not stat.S_ISREG(known.st_mode):
+                raise ConfigError(f"{path}: it is no file. Name a run's folder, or its run.mcap.")
+            return _read(path, file, known.st_size)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigError(f"{path}: {reason}. Runs keep run.mcap in runs/<time>-<rig>/.") from None
+    except MemoryError:
         raise ConfigError(
-            f"{path}: {error.strerror or error}. Runs keep run.mcap in runs/<time>-<rig>/."
+            f"{path}: it needs more memory than there is. Read it on a computer with more."
         ) from None
 
 
-def _read(path: Path, file: IO[bytes]) -> RecordedRun:
+def _opened(path: str, flags: int) -> int:
+    """Open without waiting: a pipe has no other end."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
     found = _Found()
-    for record in _records(file, found):
-        if isinstance(record, Message):
-            _take(path, found, record)
-        elif isinstance(record, Metadata) and record.name == RUN:
-            found.run = record.metadata
-            if found.run.get("format") not in {FORMAT, FORMAT_1}:
-                raise ConfigError(
-                    f"{path}: a recording of format {found.run.get('format')}; this version reads {FORMAT}. "
-                    f"Use dcmp-hil {found.run.get('version', 'of that time')}."
-                )
-        elif isinstance(record, Attachment) and record.name == RIG:
-            found.rig = json.loads(record.data)
-    if found.run is None or found.rig is None:
-        raise ConfigError(f"{path}: this is no recording of dcmp-hil, or its very beginning is missing.")
-    rig = _rig(path, found.run, found.rig)
-    rows = np.array(found.rows) if found.rows else np.empty((0, len(FIELDS)))
-    return RecordedRun(path, rig, found.run, rows, tuple(found.events), found.complete)
+    scanner = Scanner(file, size)
+    for piece in scanner:
+        if isinstance(piece, Damage):
+            found.damage.append(piece)
+        else:
+            found.take(piece, summary_checked=scanner.summary_checked is True)
+    run = found.about(path)
+    rig = _rig(path, found, run)
+    older = run["format"] == FORMAT_1
+    periods, events = found.totals()
+    event_of = event_of_format_1 if older else event_from
+    ordered = in_order(found.messages, found.began_ns, periods, events, event_of)
+    damage = _told(found, scanner, (*found.faults, *found.messages.faults, *ordered.faults), ordered.gaps)
+    unchecked = (_OLDER,) if older else ()
+    complete = not damage and not unchecked and scanner.closed and scanner.data_checked is True
+    if not complete and not damage and not unchecked:
+        damage = ("it has no checksum over all of it: another program wrote it",)
+    return RecordedRun(
+        path, rig, run, ordered.rows, ordered.events, complete, ordered.gaps, damage, unchecked
+    )
 
 
-def _take(path: Path, found: _Found, message: Message) -> None:
-    try:
-        found.take(message)
-    except ValueError as error:
-        raise ConfigError(f"{path}: something in it cannot be read ({error}).") from None
+def _told(found: _Found, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[Gap, ...]) -> tuple[str, ...]:
+    """Return what is wrong, a sentence each, the time spans first."""
+    told = [str(gap) for gap in gaps]
+    told += [f"bytes {one.at} to {one.end} are left out: {one.why}" for one in found.damage]
+    told += faults
+    if not found.damage:
+        if scanner.data_checked is False:
+            told.append("the checksum over all of it is wrong: something outside of the blocks was changed")
+        if scanner.summary_checked is False:
+            told.append("the checksum of its index is wrong")
+        if not scanner.closed:
+            told.append("it was cut off")
+    more = len(told) - _MOST_TOLD
+    return (*told[:_MOST_TOLD], f"and {more} more of the kind") if more > 0 else tuple(told)
 
 
-def _rig(path: Path, run: dict[str, str], table: dict[str, Any]) -> Rig:
+def _rig(path: Path, found: _Found, run: dict[str, str]) -> Rig:
     """Return the rig, which finds its classes where the run did as long as both lie as they lay then."""
+    table = found.attached(RIG)
+    if not isinstance(table, dict):
+        raise ConfigError(
+            f"{path}: the rig in it is missing or damaged, and its columns cannot be told without. "
+            "Use another copy of the file."
+        )
     try:
         rig = Rig.model_validate(table)
     except ValidationError as error:
         raise ConfigError(
             f"{path}: its rig is not one of this version ({error.error_count()} keys differ)."
         ) from None
+    except (RecursionError, ArithmeticError, MemoryError):
+        raise ConfigError(f"{path}: its rig is none.") from None
     return rig.in_folder(path.parent / run["rig_folder"]) if "rig_folder" in run else rig
 
 
-def _records(file: IO[bytes], found: _Found) -> Iterator[Any]:
-    """Yield records until the file ends, properly or not."""
-    try:
-        for record in StreamReader(file).records:
-            found.complete = isinstance(record, Footer)
-            yield record
-    except ConfigError:
-        raise
-    except Exception:  # noqa: BLE001 - a file that was cut, or ends in zeros, may be anything to its parsers
-        found.complete = False
-
-
 class _Found:
-    """What was found so far."""
+    """What was found in the file."""
 
     def __init__(self) -> None:
-        self.run: dict[str, str] | None = None
-        self.rig: dict[str, Any] | None = None
-        self.rows: list[NDArray[np.float64]] = []
-        self.events: list[Event] = []
-        self.complete = False
+        self.messages = Messages()
+        self.damage: list[Damage] = []
+        self.faults: list[str] = []
+        self.began_ns = 0
+        self._attached: dict[str, bytes] = {}
+        self._run: dict[str, str] | None = None
+        self._said_counts: dict[int, int] | None = None  # of a summary that was not checked yet
+        self._counts: dict[int, int] | None = None
 
-    def take(self, message: Message) -> None:
-        """Take a period or an event: JSON begins with a brace, CDR with a zero.
+    def take(self, record: Record, *, summary_checked: bool) -> None:
+        """Take a record, in the order of the file; say with the footer whether its summary was checked."""
+        try:
+            if record.opcode == Op.CHUNK:
+                self.messages.take(record.content)
+            elif record.opcode == Op.ATTACHMENT:
+                self._attach(record)
+            elif record.opcode == Op.METADATA:
+                self._describe(record)
+            elif record.opcode == Op.STATISTICS:
+                self._said_counts = counts_in(record.content)
+            elif record.opcode == Op.FOOTER:
+                self._counts = self._counts or (self._said_counts if summary_checked else None)
+            elif record.opcode == Op.MESSAGE:
+                self._fault("messages outside of blocks are left out: no checksum covers them")
+        except RecordError as error:
+            self._fault(f"a record cannot be read: {error}")
+
+    def attached(self, name: str) -> Any:
+        """Return an attached document; None if there is none that can be read."""
+        try:
+            return json.loads(self._attached[name])
+        except (KeyError, ValueError, RecursionError):
+            return None
+
+    def about(self, path: Path) -> dict[str, str]:
+        """Return what is said of the run, from under a checksum where there is one.
 
         Raises
         ------
-        ValueError
-            If it is neither.
+        ConfigError
+            If nothing is, or a version is that this one does not read.
         """
-        if message.data[:1] == b"{":
-            known = event_of_format_1 if self.run and self.run.get("format") == FORMAT_1 else event_from
-            self.events.append(known(json.loads(message.data)))
-        else:
-            self.rows.append(to_row(message.data))
+        said = self.attached(ABOUT)
+        if not isinstance(said, dict):
+            said = self._run
+            if said is not None and said.get("format") == FORMAT:
+                self._fault("what it says of its run (version, note, faults) is left as it is, unchecked")
+        if said is None and RIG in self._attached:
+            self._fault("what it says of its run (version, note, faults) is lost")
+            said = {"format": FORMAT_1}
+        if said is None:
+            raise ConfigError(f"{path}: this is no recording of dcmp-hil, or its very beginning is missing.")
+        run = {readable(str(key))[:_LONGEST]: readable(str(text))[:_LONGEST] for key, text in said.items()}
+        if run.get("format") not in {FORMAT, FORMAT_1}:
+            raise ConfigError(
+                f"{path}: a recording of format {run.get('format')}; this version reads {FORMAT}. "
+                f"Use dcmp-hil {run.get('version', 'of that time')}."
+            )
+        return run
+
+    def totals(self) -> tuple[int | None, int | None]:
+        """Return how many periods and events there were; None where nothing that was checked says it."""
+        end = self.attached(END)
+        if isinstance(end, dict) and all(isinstance(end.get(key), int) for key in ("periods", "events")):
+            return end["periods"], end["events"]
+        if self._counts is not None:
+            channels = self.messages.channel_of(CYCLES), self.messages.channel_of(EVENTS)
+            periods, events = (self._counts.get(channel, 0) for channel in channels)
+            return periods, events
+        return None, None
+
+    def _describe(self, record: Record) -> None:
+        name, entries = metadata_in(record.content)
+        if name == RUN and self._run is None:
+            self._run = entries
+
+    def _attach(self, record: Record) -> None:
+        attachment = attachment_of(record)
+        if attachment.name not in {ABOUT, RIG, END}:
+            return
+        self.began_ns = self.began_ns or attachment.log_time
+        if attachment.log_time != self.began_ns:
+            self._fault(f"{attachment.name} of another run is in it")
+        elif self._attached.setdefault(attachment.name, attachment.data) != attachment.data:
+            self._fault(f"two {attachment.name} in it differ; the first one counts")
+
+    def _fault(self, sentence: str) -> None:
+        if sentence not in self.faults:
+            self.faults.append(sentence)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd, Footer
 from mcap.writer import CompressionType, Writer
 
 from dcmp_hil.clock import utc_now
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.layout import (
+    ABOUT,
     CYCLE_SCHEMA,
     CYCLES,
+    END,
     EVENT_SCHEMA,
     EVENTS,
     LIBRARY,
@@ -21,21 +27,28 @@ from dcmp_hil.recording.layout import (
     event_to_bytes,
     to_bytes,
 )
+from dcmp_hil.recording.messages import log_times
+from dcmp_hil.recording.records import MAGIC
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
+    from typing import IO
 
+    from dcmp_hil.recording.backlog import Piece
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
 _CHUNK_S, _ROW_BYTES = 0.03, 240  # what is not in a chunk yet is lost with the process
 _LEAST = 2_000  # bytes of a chunk
-_LONGEST = 1e9  # s
+_MOST_LOST = 100  # stretches that the end names
 
 
 class Recording:
     """A sink that keeps every period and every event.
+
+    A disk that is full is asked again with every block; what waits meanwhile is kept up to a bound, and
+    what is dropped beyond it is told with its time span.
 
     Parameters
     ----------
@@ -47,11 +60,15 @@ class Recording:
         What the run is, in words.
     rig
         The rig, as JSON.
+    open_file
+        Makes the file.
 
     Attributes
     ----------
     interval
         s between two blocks: with the chunks' own 30 ms, what a killed process loses at most.
+    warnings
+        What is missing, or waits, a sentence each.
 
     Raises
     ------
@@ -61,63 +78,150 @@ class Recording:
 
     interval = 0.05
 
-    def __init__(self, path: Path, period: float, run: Mapping[str, str], rig: str) -> None:
+    def __init__(
+        self,
+        path: Path,
+        period: float,
+        run: Mapping[str, str],
+        rig: str,
+        open_file: Callable[[Path], Backlog] = Backlog,
+    ) -> None:
         self._path = path
         self._began_ns = int(utc_now().timestamp() * 1e9)  # of device time 0, near enough for a log
-        self._sequence = 0
+        self._period = self._event = 0  # numbers of the last ones
+        self._dropped_told = 0
+        self._cut_at = 0  # number of the last period in a piece
+        self._t = self._cut_t = 0.0  # s, device time of the newest, and of the last in a piece
+        self._attached = ((ABOUT, json.dumps(dict(run)).encode()), (RIG, rig.encode()))
+        self.warnings: list[str] = []
         try:
-            self._file = path.open("wb")
-            self._writer = Writer(
-                self._file,
+            self._file = open_file(path)
+            self._writer: Any = Writer(  # its methods have no types
+                cast("IO[bytes]", self._file),  # it asks for no more than write, tell and flush
                 chunk_size=max(_LEAST, round(_CHUNK_S / period) * _ROW_BYTES),
                 compression=CompressionType.ZSTD,
+                enable_data_crcs=True,
             )
             self._writer.start(profile=PROFILE, library=LIBRARY)
             self._writer.add_metadata(RUN, dict(run))
-            self._writer.add_attachment(self._began_ns, self._began_ns, RIG, "application/json", rig.encode())
+            self._attach()
             cycle = self._writer.register_schema("dcmp_hil/msg/Cycle", "ros2msg", CYCLE_SCHEMA)
             log = self._writer.register_schema("foxglove.Log", "jsonschema", EVENT_SCHEMA)
             self._cycles = self._writer.register_channel(CYCLES, "cdr", cycle)
             self._events = self._writer.register_channel(EVENTS, "json", log)
-            self._file.flush()
+            self._file.cut(0.0, 0.0, 1, 0)
+            began, reason = self._file.put(), self._file.refused
         except OSError as error:
+            began, reason = False, error.strerror or str(error)
+        if not began:
             raise ConfigError(
-                f"{path}: {error.strerror or error}. Choose a folder that you may write in, with some space "
+                f"{path}: {reason}. Choose a folder that you may write in, with some space "
                 "left, or use --no-record."
-            ) from None
+            )
 
     def block(self, block: Block) -> None:
         """Take consecutive periods."""
-        times = self._at(block["t"].tolist())
-        with self._told_of():
-            for data, at_ns in zip(to_bytes(block.rows), times, strict=True):
-                self._sequence += 1
-                self._writer.add_message(self._cycles, at_ns, data, at_ns, self._sequence)
-            self._file.flush()
+        times = block["t"]
+        at_ns = log_times(times, self._began_ns).tolist()
+        for t, data, at in zip(times.tolist(), to_bytes(block.rows), at_ns, strict=True):
+            self._period += 1
+            self._t = t
+            self._writer.add_message(self._cycles, at, data, at, self._period)
+            self._cut()
+        self._put()
 
     def event(self, event: Event) -> None:
         """Take an event."""
-        (at_ns,) = self._at([event.t])
-        with self._told_of():
-            self._writer.add_message(self._events, at_ns, event_to_bytes(event, at_ns), at_ns)
-            self._file.flush()
+        at = int(log_times(np.array([event.t]), self._began_ns)[0])
+        self._event += 1
+        self._writer.add_message(self._events, at, event_to_bytes(event, at), at, self._event)
+        self._cut()
+        self._put()
 
     def close(self) -> None:
-        """Write the index; a file without one is read as well."""
-        with self._told_of():
-            finish: Callable[[], None] = self._writer.finish
-            finish()
-            self._file.close()
+        """Write what was said of the run once more, how much there was, and the index.
 
-    def _at(self, times: list[float]) -> list[int]:
-        """Return instants since 1970, ns; a time that is no number is that of the beginning."""
-        return [self._began_ns + (round(t * 1e9) if abs(t) < _LONGEST else 0) for t in times]
-
-    @contextmanager
-    def _told_of(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
+        Raises
+        ------
+        RuntimeError
+            If the end of the run is not in the file.
+        """
+        self._writer.flush()
+        self._cut()
+        self._file.put()
+        lost = [_span(piece) for piece in self._file.dropped]
+        document = {
+            "periods": self._period,
+            "events": self._event,
+            "missing": _joined(lost)[:_MOST_LOST],
+        }
+        self._attach()
+        self._writer.add_attachment(
+            self._began_ns, self._began_ns, END, "application/json", json.dumps(document).encode()
+        )
+        if self._file.dropped:
+            self._end_without_index()
+        else:
+            self._writer.finish()
+        self._file.cut(self._t, self._t, 1, 0)
+        written = self._file.put()
+        self._tell_dropped()
+        self._file.close()
+        if not written:
             raise RuntimeError(
-                f"{self._path} is incomplete: {error.strerror or error}. Free some space; the run goes on."
-            ) from None
+                f"{self._path} is incomplete: {self._file.refused}. Its end is missing; free some space."
+            )
+
+    def _attach(self) -> None:
+        for name, data in self._attached:
+            self._writer.add_attachment(self._began_ns, self._began_ns, name, "application/json", data)
+
+    def _end_without_index(self) -> None:
+        """End the file as the format allows it where offsets are no longer known."""
+        builder: Any = RecordBuilder()
+        DataEnd(0).write(builder)
+        Footer(0, 0, 0).write(builder)
+        self._file.write(builder.end() + MAGIC)
+
+    def _cut(self) -> None:
+        """End a piece where the writer has written a block."""
+        if self._file.cut(self._cut_t, self._t, self._cut_at + 1, self._period):
+            self._cut_at, self._cut_t = self._period, self._t
+
+    def _put(self) -> None:
+        """Write what waits; tell what changed."""
+        waited = self._file.refused
+        written = self._file.put()
+        if not written and not waited:
+            self.warnings.append(
+                f"{self._path} waits: {self._file.refused}. Free some space: what is recorded meanwhile is "
+                f"written then, up to {self._file.room / 2**20:.0f} MiB of it. The run goes on."
+            )
+        elif written and waited and not self._tell_dropped():
+            self.warnings.append(f"{self._path} goes on, and nothing is missing.")
+
+    def _tell_dropped(self) -> bool:
+        """Tell what was dropped since the last time; return whether there was any."""
+        new = _joined([_span(piece) for piece in self._file.dropped[self._dropped_told :]])
+        self._dropped_told = len(self._file.dropped)
+        for start, stop, periods in new:
+            self.warnings.append(
+                f"{self._path} misses {periods} periods, device time {start:.6g} s to {stop:.6g} s: the disk "
+                "was full."
+            )
+        return bool(new)
+
+
+def _span(piece: Piece) -> tuple[float, float, int]:
+    return piece.start, piece.stop, piece.last - piece.first + 1
+
+
+def _joined(spans: list[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
+    """Join stretches that follow one another."""
+    joined: list[tuple[float, float, int]] = []
+    for start, stop, periods in spans:
+        if joined and joined[-1][1] == start:
+            joined[-1] = (joined[-1][0], stop, joined[-1][2] + periods)
+        else:
+            joined.append((start, stop, periods))
+    return joined

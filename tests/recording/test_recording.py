@@ -200,16 +200,16 @@ def test_sigkill_loses_a_tenth_of_a_second_at_most(tmp_path: Path, rate: int) ->
     assert sorted(lost)[2] <= LOST_S
 
 
-def test_a_full_disk_is_one_warning_and_what_is_there_is_read(tmp_path: Path) -> None:
+def test_a_full_disk_is_told_and_what_is_there_is_read(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     sinks = [partial(_limited, path)]
     session = Session(bench("loop.rate_hz=5000"), duration=3.0, sinks=sinks, keep_columns=False)
     session.run()
     result = session.result()
     assert result.summary.periods + result.dropped == 15_000
-    (trouble,) = result.troubles
-    assert "is incomplete" in trouble
-    assert "Free some space; the run goes on." in trouble
+    waits, incomplete = result.troubles
+    assert "waits: File too large. Free some space" in waits
+    assert "run.mcap is incomplete: File too large" in incomplete
     assert 1000 < len(read_run(path).rows) < 15_000
 
 
