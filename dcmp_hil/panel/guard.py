@@ -84,6 +84,6 @@ class Guard:
         if origin is not None and origin not in {f"http://{host}" for host in self._hosts}:
             return "Another origin than this page."
         given = request.query.get("token") or request.cookies.get(self._cookie, "")
-        if not hmac.compare_digest(given.encode(), self.token.encode()):
+        if not hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
             return "Open the address that `dcmp-hil panel` printed: it holds the token that is missing here."
         return ""

@@ -1,9 +1,13 @@
-"""The page's server: on 127.0.0.1 only, a stream of states one way, changes and STOP the other."""
+"""The page's server: on 127.0.0.1 only, a stream of states one way, changes and STOP the other.
+
+What reaches it came through `Door`: whole requests, few at a time.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import socket
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from importlib import resources
@@ -11,9 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 from aiohttp import web
 
+from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
+from dcmp_hil.panel.door import BACKLOG, Door, Visit
 from dcmp_hil.panel.guard import Guard
+from dcmp_hil.panel.head import BODY_BYTES
+from dcmp_hil.panel.quiet import quiet
 from dcmp_hil.panel.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -22,7 +30,8 @@ if TYPE_CHECKING:
 _PAGE = resources.files("dcmp_hil.panel").joinpath("page")
 _FILES = {"/": "text/html", "/panel.css": "text/css", "/panel.js": "text/javascript"}
 _EVERY = 0.15  # s between two states that a page is sent
-_LONGEST = 1 << 14  # bytes of a request
+_QUEUE = 1024  # connections that the kernel keeps while this process is busy
+_FRESH = 1.0  # s: a STOP that is older was pressed for something that has passed, or for another run
 _NO_RUN = "There is no run."
 
 
@@ -44,6 +53,9 @@ class Panel:
         self._port, self._viewer = port, viewer
         self._watcher = Watcher(pid)
         self._stopping = ThreadPoolExecutor(2)  # STOP queues behind nothing
+        self._stop_of: dict[
+            int, asyncio.Task[str]
+        ] = {}  # by run: a second STOP waits for the first one's answer
         self._ending = asyncio.Event()
 
     def application(self) -> web.Application:
@@ -53,7 +65,7 @@ class Panel:
         async def check(request: web.Request, handler: Any) -> web.StreamResponse:
             return await self.guard.check(request, handler)
 
-        app = web.Application(middlewares=[check], client_max_size=_LONGEST)
+        app = web.Application(middlewares=[check], client_max_size=BODY_BYTES)
         app.on_response_prepare.append(self.guard.add_headers)
         app.cleanup_ctx.append(self._watching)
         app.on_shutdown.append(self._end)
@@ -72,16 +84,25 @@ class Panel:
         """
         runner = web.AppRunner(self.application(), access_log=None, shutdown_timeout=0.5)
         await runner.setup()
-        try:
-            await web.TCPSite(runner, "127.0.0.1", self._port).start()
-            ready(self.guard.address)
-            await asyncio.Event().wait()
-        except OSError as error:
-            raise ConfigError(
-                f"--port {self._port}: {error.strerror}. Choose another, or end what uses it."
-            ) from None
-        finally:
-            await runner.cleanup()
+        assert runner.server is not None  # noqa: S101 - `setup` made it
+        loop = asyncio.get_running_loop()
+        door = Door(runner.server, self.guard.token)
+        server = None
+        with quiet(loop):
+            try:
+                server = await loop.create_server(door, "127.0.0.1", self._port, backlog=BACKLOG)
+                for listening in server.sockets:
+                    _keep_more_waiting(listening)
+                ready(self.guard.address)
+                await asyncio.Event().wait()
+            except OSError as error:
+                raise ConfigError(
+                    f"--port {self._port}: {error.strerror}. Choose another, or end what uses it."
+                ) from None
+            finally:
+                if server is not None:
+                    server.close()
+                await runner.cleanup()
 
     async def _watching(self, _: web.Application) -> AsyncIterator[None]:
         task = asyncio.ensure_future(self._watcher.watch())
@@ -105,7 +126,8 @@ class Panel:
         await answer.prepare(request)
         try:
             while not self._ending.is_set():
-                await answer.write(f"data: {json.dumps(self._watcher.state)}\n\n".encode())
+                state = {**self._watcher.state, "server_ms": _now_ms()}
+                await answer.write(f"data: {json.dumps(state)}\n\n".encode())
                 await asyncio.sleep(_EVERY)
         except ConnectionError:  # the page was closed
             pass
@@ -123,23 +145,67 @@ class Panel:
         except ConfigError as error:
             return _said(ok=False, said=str(error))
 
-    async def _stop(self, _: web.Request) -> web.Response:
+    async def _stop(self, request: web.Request) -> web.Response:
+        """Stop the run, unless the STOP waited for longer than a second on its way here."""
+        pressed_ms = await _pressed_ms(request)
         run = self._watcher.run
         if run is None:
             return _said(ok=False, said=_NO_RUN)
+        if run not in self._stop_of:
+            task = asyncio.ensure_future(self._stop_fresh(run, pressed_ms))
+            self._stop_of[run] = task
+            task.add_done_callback(lambda _: self._stop_of.pop(run, None))
         try:
-            await asyncio.get_running_loop().run_in_executor(self._stopping, stop, run)
+            return _said(ok=True, said=await asyncio.shield(self._stop_of[run]))
         except ConfigError as error:
             return _said(ok=False, said=str(error))
-        return _said(ok=True, said="STOP: the run ends at 0 V")
+
+    async def _stop_fresh(self, run: int, pressed_ms: float) -> str:
+        def stop_it() -> str:
+            waited = 1e-3 * (_now_ms() - pressed_ms)
+            if waited > _FRESH:
+                raise ConfigError(
+                    f"STOP not confirmed: it waited for {waited:.1f} s and was dropped. Press it again."
+                )
+            stop(run)
+            return "STOP: the run ends at 0 V"
+
+        return await asyncio.get_running_loop().run_in_executor(self._stopping, stop_it)
+
+
+def _now_ms() -> float:
+    """Return ms on the monotonic clock: what a page is told, and counts on from."""
+    return 1e-6 * MonotonicClock().now_ns()
+
+
+def _keep_more_waiting(listening: socket.socket) -> None:
+    """Have the kernel keep more connections than are taken from it at once."""
+    again = socket.fromfd(listening.fileno(), socket.AF_INET, socket.SOCK_STREAM)
+    with again:
+        again.listen(_QUEUE)
+
+
+async def _pressed_ms(request: web.Request) -> float:
+    """Return when STOP was pressed: as the page says, else when its connection was taken."""
+    transport = request.transport
+    visit = transport.get_protocol() if transport is not None else None
+    arrived_ms = 1e-6 * visit.arrived_ns if isinstance(visit, Visit) else _now_ms()
+    body = await _json(request)
+    said = body.get("pressed_ms") if isinstance(body, dict) else None
+    return min(arrived_ms, said) if isinstance(said, int | float) else arrived_ms
+
+
+async def _json(request: web.Request) -> Any:
+    """Return the body; None if it is no JSON. Its charset is not asked: JSON is UTF-8."""
+    try:
+        return json.loads(await request.read())
+    except (ValueError, RecursionError):
+        return None
 
 
 async def _changes_in(request: web.Request) -> list[str] | None:
     """Return what a request wants changed; None if it is no list of texts."""
-    try:
-        body = await request.json()
-    except ValueError:
-        return None
+    body = await _json(request)
     changes = body.get("changes") if isinstance(body, dict) else None
     good = isinstance(changes, list) and all(isinstance(one, str) for one in changes)
     return changes if good else None

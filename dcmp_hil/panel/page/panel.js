@@ -7,6 +7,7 @@ const EVERY_MS = 150; // between two changes while a slider moves
 const [LEAST_S, TRACE_S] = [2, 20]; // of time that the lines show
 const GROUPS = { controller: "Controller", observer: "Observer", reference: "Reference" };
 const LOG = 2; // lines
+const CONFIRM_MS = 1000; // for STOP to be confirmed in
 
 let state = { connection: "none" };
 let shape = "";
@@ -35,13 +36,32 @@ function log(reply) {
   while (by("log").children.length > LOG) by("log").lastChild.remove();
 }
 
+// The server's clock as this page knows it: a STOP that is older than a second when it is read is dropped there.
+let serverClock = null; // [server_ms, performance.now() when it came]
+const serverNow = () => (serverClock ? serverClock[0] + performance.now() - serverClock[1] : undefined);
+
+let doubt = ""; // what the banner says of a STOP that nobody has confirmed
+
+function doubtStop(sentence) {
+  doubt = sentence;
+  drawState();
+}
+
 async function stop() {
   by("stop").textContent = "STOPPING …";
+  const late = setTimeout(
+    () => doubtStop("STOP not confirmed: no answer for a second. Press Ctrl-C where the run was started, or the e-stop."),
+    CONFIRM_MS,
+  );
+  let reply;
   try {
-    log(await post("stop"));
+    reply = await post("stop", { pressed_ms: serverNow() });
   } catch {
-    log({ ok: false, said: "The page's server does not answer: press Ctrl-C where the run was started." });
+    reply = { ok: false, said: "STOP not confirmed: the page's server does not answer. Press Ctrl-C where the run was started." };
   }
+  clearTimeout(late);
+  doubtStop(reply.ok ? "" : reply.said);
+  log(reply);
 }
 
 by("stop").addEventListener("click", stop);
@@ -262,12 +282,14 @@ function drawState() {
     lost: "The page's server is gone: start `dcmp-hil panel` again. STOP is Ctrl-C where the run was started.",
   };
   const banner = by("banner");
-  banner.textContent = live ? state.fault : sentences[state.connection];
+  if (state.connection === "ended" || state.connection === "none" || (live && state.stopping)) doubt = "";
+  banner.textContent = doubt || (live ? state.fault : sentences[state.connection]);
   banner.hidden = !banner.textContent;
-  banner.classList.toggle("bad", Boolean(state.fault) || state.connection === "lost");
+  banner.classList.toggle("bad", Boolean(doubt) || Boolean(state.fault) || state.connection === "lost");
 }
 
 function take(now) {
+  if (typeof now.server_ms === "number") serverClock = [now.server_ms, performance.now()];
   if (now.pid !== state.pid && now.pid) trace.length = 0;
   state = now.connection === "live" ? now : { ...state, ...now };
   if (now.connection === "live") {
