@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
+    from dcmp_hil.endings import StopRequest
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
@@ -54,6 +55,7 @@ def assemble(
     in_line: bool,
     apart: Apart | None = None,
     mailbox: Mailbox | None = None,
+    stop: StopRequest | None = None,
     faults: Faults = NO_FAULTS,
 ) -> tuple[Line, Recorder]:
     """Make every stage of the line, and the recorder that it reports to.
@@ -78,7 +80,13 @@ def assemble(
     )
     measured = rig.controller.position == "measured"
     changes = mailbox and LiveChanges(
-        mailbox, trajectory, controller, observer, delay=rig.delay, notify=recorder.event
+        mailbox,
+        trajectory,
+        controller,
+        observer,
+        delay=rig.delay,
+        notify=recorder.event,
+        stop=stop,
     )
     outliers = make_outliers(rig)
     stages = ((observer, rig.observer), (controller, rig.controller))

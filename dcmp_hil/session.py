@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Literal
@@ -106,7 +107,15 @@ class Session:
         else:
             here, there = sorted_out(sinks)
             model = rig.model.values()
-            self._apart = Apart(statistics, keep=keep_columns, sinks=there, warn=warn, model=model)
+            self._apart = Apart(
+                statistics,
+                keep=keep_columns,
+                sinks=there,
+                warn=warn,
+                model=model,
+                unattended=pickle.dumps(control.unattended) if control else b"",
+                mailbox=control.file if control else None,
+            )
         self._control = control
         mailbox = control.mailbox if control else None
         self._line, self._recorder = assemble(
@@ -116,6 +125,7 @@ class Session:
             in_line=fast,
             apart=self._apart,
             mailbox=mailbox,
+            stop=self.stop,
             faults=inject(rig, faults) if isinstance(faults, Iterable) else faults,
         )
         self._deferred = [sink for sink in here if isinstance(sink, Deferred)]
@@ -159,7 +169,9 @@ class Session:
             raise
         finally:
             if self._control:
-                self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.")
+                self.stop.wake_no_more()
+                confirmed = end[0] == "INFO"
+                self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.", confirmed=confirmed)
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.link.finish(recorder.t)
@@ -178,6 +190,7 @@ class Session:
             self._apart.open(lambda: self.stop.requested)
         if self._control:
             self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
+            self.stop.wake(self._control.signals)
         return nullcontext()
 
     def _warn_live(self, sentence: str) -> None:

@@ -325,8 +325,9 @@ def test_amplifier_is_released_when_a_users_code_raises(where: str, error: type[
         on_read=read if where == "read" else None,
         on_write=(lambda _: boom()) if where == "write" else None,
     )
-    named_one = error in {RuntimeError, SystemExit}  # as the failure of a class that the rig names
     stage = where in {"observer", "controller"}
+    named_one = stage and error is not LinkError  # as the failure of a class that the rig names
+    named_one = named_one or error in {RuntimeError, SystemExit}
     ends: type[BaseException] = (TripError if stage else BackendError) if named_one else error
     with pytest.raises(ends, match="the user's own") as caught:
         held.run()

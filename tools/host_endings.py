@@ -97,9 +97,9 @@ WAYS = {
     "SIGTERM": Way(143, signal.SIGTERM),
     "SIGHUP": Way(129, signal.SIGHUP),
     "controller: Exception": _part_of("controller", "Controller", "ValueError", _TRIPPED),
-    "controller: BaseException": _part_of("controller", "Controller", "Wrong", _BROKEN),
+    "controller: BaseException": _part_of("controller", "Controller", "Wrong", _TRIPPED),
     "observer: Exception": _part_of("observer", "Observer", "ValueError", _TRIPPED),
-    "observer: BaseException": _part_of("observer", "Observer", "Wrong", _BROKEN),
+    "observer: BaseException": _part_of("observer", "Observer", "Wrong", _TRIPPED),
     "controller: no voltage": _part_of("controller", "Controller", "no voltage", _TRIPPED),
     "the loop itself": _part_of("controller", "Controller", "the loop", _BROKEN),
 }

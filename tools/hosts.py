@@ -53,17 +53,17 @@ def is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
     return False
 
 
-def wait(holds: Callable[[], bool], what: str) -> None:
+def wait(holds: Callable[[], object], what: str, within_s: float = BOUND_S) -> None:
     """Look every 2 ms until something holds.
 
     Raises
     ------
     TimeoutError
-        If it does not within a minute.
+        If it does not within `within_s` (s).
     """
     clock = MonotonicClock()
-    until_ns = clock.now_ns() + int(1e9 * BOUND_S)
+    until_ns = clock.now_ns() + int(1e9 * within_s)
     while not holds():
         if clock.now_ns() > until_ns:
-            raise TimeoutError(f"waited {BOUND_S:g} s until {what}")
+            raise TimeoutError(f"waited {within_s:g} s until {what}")
         pause(_LOOK_S)

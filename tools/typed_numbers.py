@@ -129,11 +129,12 @@ class _Setter:
 
     def __init__(self) -> None:
         self.mailbox = Mailbox()
+        self.signals, self.file, self.unattended = -1, None, None
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Nothing to start."""
 
-    def close(self, last_words: str) -> None:
+    def close(self, last_words: str, *, confirmed: bool) -> None:
         """Nothing to end."""
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import functools
-import os
 import sys
-import threading
-from typing import TYPE_CHECKING, Annotated, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
 import typer
 
@@ -16,7 +14,8 @@ from dcmp_hil.cli.check import check
 from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
-from dcmp_hil.cli.live import set_keys, status, stop
+from dcmp_hil.cli.leaving import leave
+from dcmp_hil.cli.live import set_keys, status, stop, tell_stopped
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.panel import panel
 from dcmp_hil.cli.paper import paper
@@ -27,7 +26,6 @@ from dcmp_hil.cli.run import run
 from dcmp_hil.cli.view import view
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.host import require_linux
-from dcmp_hil.telemetry.outlet import THREAD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,26 +92,26 @@ def _options(
     """Run a DC-motor pendulum: observer, controller, amplifier, live picture."""
 
 
-def main() -> None:
-    """Run the command line; every error of this package becomes its message and its exit code."""
+def main(stopped: Any = None) -> None:
+    """Run the command line; every error of this package becomes its message and its exit code.
+
+    Parameters
+    ----------
+    stopped
+        What became of `dcmp-hil stop`, where that was done before this module was imported.
+    """
     streams.guard()
     try:
-        _call()
+        _call(stopped)
     except SystemExit as leaving:
-        if any(thread.name == THREAD for thread in threading.enumerate()):
-            _leave_at_once(leaving.code if isinstance(leaving.code, int) else bool(leaving.code))
+        leave(leaving.code if isinstance(leaving.code, int) else int(bool(leaving.code)))
         raise
 
 
-def _leave_at_once(code: int) -> None:
-    """Leave without Rerun's own ending, which waits for a frozen viewer for ever."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
-def _call() -> None:
+def _call(stopped: Any) -> None:
     try:
+        if stopped is not None:
+            tell_stopped(stopped)
         app()
     except DcmpError as error:
         console.complain(error)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from dcmp_hil.cli import console
+from dcmp_hil.errors import DcmpError
+
+if TYPE_CHECKING:
+    from dcmp_hil.live.stopping import Stopped
 
 Run = Annotated[int | None, typer.Option("--run", metavar="PID", help="Which run, where there are several.")]
 
@@ -27,13 +33,30 @@ def set_keys(
 
 
 def stop(run: Run = None) -> None:
-    """End a run as Ctrl-C does: 0 V, and everything kept."""
-    from dcmp_hil.live.client import find_run
-    from dcmp_hil.live.client import stop as end
+    """End a run as Ctrl-C does: 0 V, and everything kept; by force where it does not answer.
 
-    pid = find_run(run)
-    end(pid)
-    console.out.print(f"the run of process {pid} ends at 0 V", highlight=False)
+    Exit code: 0 if 0 V is confirmed, 3 if the run ended and its device did not confirm it, 7 if the run did
+    not answer and was ended by force, 1 if it goes on.
+    """
+    from dcmp_hil.live.client import stop_found
+
+    tell_stopped(stop_found(run))
+
+
+def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
+    """Say what became of STOP, and leave with its exit code."""
+    if isinstance(stopped, DcmpError):
+        raise stopped
+    from dcmp_hil.live.stopping import End
+
+    pid, (end, said) = stopped
+    sentence = f"the run of process {pid}: {said}"
+    if end is End.CONFIRMED:
+        console.out.print(sentence, highlight=False, markup=False)
+    else:
+        console.err.print(Text.assemble(("error: ", "bold red"), sentence))
+    codes = {End.CONFIRMED: 0, End.UNCONFIRMED: 3, End.FORCED: 7, End.FAILED: 1}
+    sys.exit(codes[end])
 
 
 def status(run: Run = None) -> None:
@@ -47,13 +70,19 @@ def status(run: Run = None) -> None:
         f"process {pid}",
         str(state.get("rig")),
         _number(state.get("t_s"), "{:.2f} s"),
-        str(state.get("phase")),
+        _phase(state),
         _number(state.get("position_rad"), "position {:+.3f} rad"),
         _number(state.get("error_mrad"), "error {:+.2f} mrad"),
         _number(state.get("voltage_V"), "voltage {:+.2f} V"),
         str(state.get("fault") or "no fault"),
     ]
     console.out.print("  ".join(part for part in parts if part), highlight=False, markup=False)
+
+
+def _phase(state: dict[str, Any]) -> str:
+    """Name the phase; what a run said before it fell silent is told as old."""
+    phase, age = str(state.get("phase")), state.get("age_s")
+    return f"silent for {age:.1f} s, before that:" if phase == "silent" and age else phase
 
 
 def _number(value: object, form: str) -> str:

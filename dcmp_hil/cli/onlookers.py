@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def status_line(period: float) -> Sink:
     """Return the status line of a run whose samples come every `period` (s)."""
     streams.guard()
-    _use_terminal()
+    use_terminal()
     return StatusLine(console.err, period)
 
 
@@ -44,7 +44,7 @@ def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> 
     from dcmp_hil.cli.watching import watched
     from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
 
-    _use_terminal()
+    use_terminal()
     return watched(RerunSink(view, record, viewer, port=port, spare=True), viewer)
 
 
@@ -105,7 +105,7 @@ class _Replacing:
                 self._beside.unlink(missing_ok=True)
 
 
-def _use_terminal() -> None:
+def use_terminal() -> None:
     """Print on the terminal, in the telemetry process, whose own standard error is a log."""
     number = process_log.terminal()
     if number is not None and console.err.file.fileno() != number:

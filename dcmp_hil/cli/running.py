@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import signal
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil import __version__, process_log
+from dcmp_hil import process_log
 from dcmp_hil.cli import console
 from dcmp_hil.cli.foreign_lines import split_stderr
 from dcmp_hil.cli.onlookers import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.outputs import json_place, try_places
+from dcmp_hil.cli.run_document import run_document, write_json
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.summary import summary_table
+from dcmp_hil.cli.unattended import Unattended
 from dcmp_hil.cli.watching import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.errors import DcmpError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
+from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import viewer as window
@@ -31,7 +34,6 @@ if TYPE_CHECKING:
 
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
-    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
@@ -105,7 +107,7 @@ def _session(
         keep_columns=folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options),
         stop=stop,
         warn=console.warn,
-        control=_control(options),
+        control=_control(rig, options, folder),
         faults=faults,
     )
 
@@ -121,23 +123,28 @@ class _End(NamedTuple):
 def _to_its_end(session: Session) -> _End:
     stop = session.stop
     try:
-        session.run()
+        with exits_named():
+            session.run()
     except TripError as trip:
         return _End(trip.reason, trip, trip.exit_code)
     except KeyboardInterrupt:  # a second Ctrl-C, because something hung; 0 V was driven on the way out
         return _End("KeyboardInterrupt", None, 128 + signal.SIGINT)
+    except SystemExit as leaving:  # its code would be that of the run
+        return _End("SystemExit", DcmpError(f"Something in the run called sys.exit: {leaving.code}."), 1)
     except BaseException as error:  # noqa: BLE001 - raised again as soon as everything is kept
         return _End(type(error).__name__, error, 1)
-    return _End(stop.signal.name if stop.signal else "duration", None, stop.exit_code)
+    return _End(stop.asked_by or "duration", None, stop.exit_code)
 
 
-def _control(options: Options) -> ControlProcess | None:
-    """Let others change the run while it goes on; in virtual time it is over too soon."""
-    if options.fast or not options.control:
+def _control(rig: Rig, options: Options, folder: RunFolder | None) -> ControlProcess | None:
+    """Let others stop and change the run while it goes on; in virtual time it is over too soon."""
+    if options.fast:
         return None
     from dcmp_hil.live.process import ControlProcess
 
-    return ControlProcess()
+    place = folder.path.absolute() if folder else None
+    unattended = Unattended(rig, place, options.json_file, options.note, options.faults)
+    return ControlProcess(listen=options.control, unattended=unattended)
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:
@@ -166,12 +173,12 @@ def _wants_picture(options: Options) -> bool:
 
 def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> None:
     """Keep and print the figures of every kind of end; an error here is told, and changes no end."""
-    cut_off = session.stop.signal is not None
+    cut_off = session.stop.requested
     with session.stop.held():
         result = session.result()
-        document = _document(session, options, result, end.ended_by)
+        document = run_document(session.rig, options.note, options.faults, result, end.ended_by)
         missing = folder.write(session.rig, document, end.error) if folder else []
-        missing += _write_json(options.json_file, document)
+        missing += write_json(options.json_file, document)
     with suppress(KeyboardInterrupt):  # a user need not wait for a slow reader, or for a picture
         if options.json_file == "-":
             console.write_json("-", document)
@@ -183,42 +190,3 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
             if not cut_off:  # drawing takes seconds, and the end was asked for
                 folder.draw(result)
             folder.tell(options.record, live=options.viewer != "none")
-
-
-def _document(session: Session, options: Options, result: Result, ended_by: str) -> dict[str, Any]:
-    return {
-        **asdict(result.summary),
-        "rig": session.rig.name,
-        "note": options.note,
-        "faults": options.faults,
-        "version": __version__,
-        "ended_by": ended_by,
-        "dropped_periods": result.dropped,
-        "link": _link(result),
-        "device_end": result.device_end and result.device_end._asdict(),
-        "overruns": result.overruns,
-        "outliers": result.outliers,
-        "motor_gain": result.motor_gain and result.motor_gain.document(),
-        "troubles": result.troubles,
-        "changes": result.changes,
-        "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
-        "host": result.host,
-    }
-
-
-def _write_json(target: str | None, document: dict[str, Any]) -> list[str]:
-    """Write the file of `--json`; return what went wrong."""
-    if target is None or target == "-":
-        return []
-    try:
-        console.write_json(target, document)
-    except ConfigError as error:
-        return [str(error)]
-    return []
-
-
-def _link(result: Result) -> dict[str, Any] | None:
-    """Return the counters of a link, and what they mean."""
-    if result.link is None:
-        return None
-    return asdict(result.link) | {"warnings": [concern._asdict() for concern in result.link_concerns]}

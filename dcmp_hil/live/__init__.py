@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.telemetry.figures import Figures
 
 
 class Control(Protocol):
@@ -17,6 +18,25 @@ class Control(Protocol):
     @property
     def mailbox(self) -> Mailbox:
         """Where changes come from."""
+        ...
+
+    @property
+    def unattended(self) -> Callable[[Figures, int, str, str], None] | None:
+        """Called in the telemetry process where the run's process has ended by force; it can be pickled.
+
+        It is given the figures, the periods that are in none of them, and how the run ended: in a word that
+        stays the same, and in a sentence.
+        """
+        ...
+
+    @property
+    def file(self) -> int | None:
+        """Descriptor of the mailbox's memory, for other processes; None if it has none."""
+        ...
+
+    @property
+    def signals(self) -> int:
+        """Descriptor that takes the numbers of signals that ask for the end; -1 before `open`, or without."""
         ...
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
@@ -33,8 +53,8 @@ class Control(Protocol):
         """
         ...
 
-    def close(self, last_words: str) -> None:
-        """Listen no longer, the run having ended like this."""
+    def close(self, last_words: str, *, confirmed: bool) -> None:
+        """Listen no longer, the run having ended like this; `confirmed` is whether at 0 V for sure."""
         ...
 
 

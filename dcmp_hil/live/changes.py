@@ -6,7 +6,8 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.controllers import Gains
-from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING, Answer
+from dcmp_hil.endings import StopRequest
+from dcmp_hil.live.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
 from dcmp_hil.supervisor import Phase
 from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 
@@ -23,7 +24,12 @@ if TYPE_CHECKING:
 RAMP = 0.25  # s, over which gains go from old to new
 _PLACES = {phase.value: place for place, phase in enumerate(Phase)}
 _KEPT = 1000  # changes that the summary lists
-_AWAKE = -1  # no number of a change: there is something to do every period
+_AWAKE = -1  # no number of the bell: there is something to do every period
+_OTHER_HANDLERS = (
+    "Something in this process sets or blocks signals that end a run ({names}); they end it as before. Take "
+    "the calls of signal.signal and pthread_sigmask out of the class of your own, or have the library leave "
+    "signals alone (rclpy: init(signal_handler_options=SignalHandlerOptions.NO))."
+)
 
 
 class Changes(Protocol):
@@ -57,6 +63,8 @@ class LiveChanges:
         s, from a sample to the instant at which its command acts.
     notify
         Told of every change.
+    stop
+        Asked for the end where the mailbox says STOP.
 
     Attributes
     ----------
@@ -73,19 +81,24 @@ class LiveChanges:
         *,
         delay: float,
         notify: Callable[[Event], None],
+        stop: StopRequest | None = None,
     ) -> None:
         self._mailbox, self._words = mailbox, mailbox.words
         self._trajectory, self._controller, self._observer = trajectory, controller, observer
         self._delay = delay
         self._notify = notify
-        self._seen = self._number = mailbox.words[0]
+        self._stop = stop or StopRequest()
+        self._seen = mailbox.words[BELL]
+        self._number = mailbox.asked
+        self._handlers = mailbox.handlers_asked
+        self._refused = False
         self._ramp: _Ramp | None = None
         self._news: deque[str] = deque()
         self.made: list[str] = []
 
     def apply(self, t: float) -> None:
         """Apply what waits, between the period of device time `t` (s) and the next."""
-        if self._words[0] != self._seen:
+        if self._words[BELL] != self._seen:
             self._look(t)
 
     def event(self, event: Event) -> None:
@@ -100,15 +113,29 @@ class LiveChanges:
         self._seen = _AWAKE
 
     def _look(self, t: float) -> None:
-        number = self._words[0]
+        bell = self._words[BELL]  # before the rest: what comes meanwhile rings again
+        if asked_by := self._mailbox.take_stop():
+            self._stop.ask(asked_by)
+        if self._mailbox.handlers_asked != self._handlers:
+            self._handlers = self._mailbox.handlers_asked
+            self._keep_handlers(t)
+        number = self._mailbox.asked
         if number != self._number:
             self._number = number
             self._take(number, t)
         if self._ramp is not None and self._ramp.over(t):
             self._ramp = None
-        self._seen = number if self._ramp is None else _AWAKE
+        self._seen = bell if self._ramp is None else _AWAKE
         while self._news:
             self._notify(Event(t, "WARN", EventKind.CONTROL, self._news.popleft()))
+
+    def _keep_handlers(self, t: float) -> None:
+        """Put the signal handlers in again; tell once that something else was there."""
+        self._stop.reinstall()
+        if self._stop.refused and not self._refused:
+            self._refused = True
+            names = ", ".join(sorted(number.name for number in self._stop.refused))
+            self._notify(Event(t, "WARN", EventKind.CONTROL, _OTHER_HANDLERS.format(names=names)))
 
     def _take(self, number: int, t: float) -> None:
         try:

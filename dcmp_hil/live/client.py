@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import socket
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.places import peer_of, running, socket_of
+from dcmp_hil.errors import ConfigError, DcmpError
+from dcmp_hil.live.places import mailbox_of, running, socket_of
+from dcmp_hil.live.stopping import LIMIT, End, Stopped, is_alive, stop_run
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _SLOW = 3.0  # s: a change has a second to be applied in
-_STOP = 0.5  # s after which STOP takes the short way
+_TAKEN = 0.15  # s for a control process to say that it has understood STOP
 _NONE = "No run listens here. Start one with `dcmp-hil run`; --no-control and --fast keep it from listening."
 
 
@@ -30,7 +28,7 @@ def find_run(pid: int | None = None) -> int:
         If there is none, or there are several and none was named.
     """
     runs = running()
-    if pid is not None and pid not in runs:
+    if pid is not None and pid not in runs and mailbox_of(pid) is None:
         raise ConfigError(f"No run of process {pid} listens here. {_listed(runs)}")
     if pid is not None:
         return pid
@@ -64,32 +62,52 @@ def status(run: int) -> dict[str, Any]:
     return _ask(run, {"do": "status"}, _SLOW)
 
 
-def stop(run: int) -> None:
-    """End a run as Ctrl-C does; where its control process is silent, by the signal itself.
+def stop(run: int) -> Stopped:
+    """End a run, by force where it does not answer; return within a second what became of it.
+
+    Its control process does it. Where that is silent, it is done here, by the memory that the two share.
 
     Raises
     ------
     ConfigError
         If there is no such run any more.
     """
-    gone = ConfigError(f"The run of process {run} listens no more: it has ended, or does so now.")
-    with socket.socket(socket.AF_UNIX) as connection:
-        connection.settimeout(_STOP)
+    with socket.socket(socket.AF_UNIX) as connection, suppress(OSError):
+        connection.settimeout(_TAKEN)
+        connection.connect(str(socket_of(run)))
+        return _exchange_stop(connection)
+    mailbox = mailbox_of(run)
+    if mailbox is None:
+        raise ConfigError(f"The run of process {run} listens no more: it has ended, or does so now.")
+    return stop_run(run, mailbox, lambda: is_alive(run), late=_TAKEN)
+
+
+def stop_found(pid: int | None) -> tuple[int, Stopped] | DcmpError:
+    """End the run that is meant; return its process id and what became of it, or what is wrong."""
+    try:
+        run = find_run(pid)
+        return run, stop(run)
+    except DcmpError as error:
+        return error
+
+
+def _exchange_stop(connection: socket.socket) -> Stopped:
+    """Ask the control process.
+
+    Raises
+    ------
+    OSError
+        If it is silent, leaves, or answers nonsense.
+    """
+    connection.sendall(json.dumps({"do": "stop"}).encode() + b"\n")
+    with connection.makefile("rb") as lines:
+        lines.readline()  # that it was understood
+        connection.settimeout(LIMIT)
         try:
-            connection.connect(str(socket_of(run)))
-            if _exchange(connection, {"do": "stop"}) is None:
-                raise gone
-        except TimeoutError:
-            _interrupt(run, connection)
-        except OSError:
-            raise gone from None
-
-
-def _interrupt(run: int, connection: socket.socket) -> None:
-    """Send the signal, if whoever listens is a child of that run: process ids are used again."""
-    if _parent_of(peer_of(connection)[0]) == run:
-        with suppress(ProcessLookupError):
-            os.kill(run, signal.SIGINT)
+            reply = json.loads(lines.readline())
+            return Stopped(End(reply["end"]), str(reply["said"]))
+        except (ValueError, KeyError, TypeError):
+            raise ConnectionResetError from None
 
 
 def _ask(run: int, request: dict[str, Any], patience: float) -> dict[str, Any]:
@@ -119,15 +137,6 @@ def _exchange(connection: socket.socket, request: dict[str, Any]) -> dict[str, A
         except ValueError:
             return None
     return reply if isinstance(reply, dict) else None
-
-
-def _parent_of(pid: int) -> int:
-    """Return the parent of a process; 0 if it is gone."""
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text("utf-8")
-    except OSError:
-        return 0
-    return int(stat.rpartition(")")[2].split()[1])
 
 
 def _listed(runs: Sequence[int]) -> str:

@@ -15,23 +15,34 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.endings import SIGNALS
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.live.knobs import knobs
-from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, Mailbox
+from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.live.places import peer_of, socket_of
 from dcmp_hil.live.settable import changed, doubts
 from dcmp_hil.live.state import state_of
+from dcmp_hil.live.stopping import stop_run
+from dcmp_hil.run_end import LIVES
 from dcmp_hil.telemetry.ring import Ring, capacity_of
 from dcmp_hil.telemetry.shared import mapped
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from dcmp_hil.config import Rig
     from dcmp_hil.live.mailbox import Answer
+    from dcmp_hil.live.stopping import Stopped
 
 _LONGEST = 1 << 16  # bytes of a request
 _ANSWER = 1.0  # s for the loop to take a change
 _LOOK = 0.002  # s
 _SHOWN = 0.1  # s between two states that are sent to whoever watches
+_ROUND = 0.05  # s between two looks at the run: whether it lives, and its newest period
+_HANDLERS = 4  # rounds between two looks of the loop at its signal handlers
+_ANSWERS = 0.3  # s for those who asked for STOP to be answered in, after the end
+_NUMBERS = 1 << 10  # of signals, that are taken at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +55,14 @@ class Setup:
         As it runs.
     mailbox, ring
         Descriptors of their memory.
+    listen
+        Whether others may change the run; STOP by a signal is seen to in any case.
     """
 
     rig: Rig
     mailbox: int
     ring: int
+    listen: bool = True
 
 
 class Server:
@@ -71,7 +85,10 @@ class Server:
         size = os.fstat(setup.ring).st_size
         self._ring = Ring(capacity_of(size), mapped(setup.ring, size))
         self._one_at_a_time = asyncio.Lock()
-        self._stopping = False
+        self._clock = MonotonicClock()
+        self._written, self._newest_ns = 0, self._clock.now_ns()
+        self._stopping: asyncio.Task[Stopped] | None = None
+        self._unanswered = 0  # who asked for STOP and has no answer yet
         self._watchers: set[asyncio.StreamWriter] = set()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -99,7 +116,7 @@ class Server:
             self._watchers.add(writer)
             await self._watch(writer)
         elif do == "stop":
-            await _send(writer, self._stop())
+            await self._answer_stop(writer)
         elif do == "set":
             async with self._one_at_a_time:
                 await _send(writer, await self._set(request.get("changes")))
@@ -112,16 +129,38 @@ class Server:
             await asyncio.sleep(_SHOWN)
 
     def _state(self) -> dict[str, Any]:
-        state = state_of(self._ring.latest(), self._mailbox.phase, self._rig)
-        state |= {"pid": self._parent, "stopping": self._stopping, "knobs": self._knobs}
+        age = 1e-9 * (self._clock.now_ns() - self._newest_ns)
+        state = state_of(self._ring.latest(), self._mailbox.phase, self._rig, age)
+        state |= {"pid": self._parent, "stopping": self._stopping is not None, "knobs": self._knobs}
         return state
 
-    def _stop(self) -> dict[str, Any]:
-        """Ask for the end as Ctrl-C does, once: a second one would not be an orderly one."""
-        if not self._stopping and os.getppid() == self._parent:
-            self._stopping = True
-            os.kill(self._parent, signal.SIGINT)
-        return {"ok": True, "said": "the run ends at 0 V"}
+    def look(self) -> bool:
+        """Note how old the newest period is; return whether the run's process is there."""
+        written = self._ring.written
+        if written != self._written:
+            self._written, self._newest_ns = written, self._clock.now_ns()
+        return os.getppid() == self._parent
+
+    def stop(self, by: int = STOP) -> asyncio.Task[Stopped]:
+        """Have the run end, once; it is forced to where it does not answer."""
+        if self._stopping is None:
+            self._stopping = asyncio.ensure_future(asyncio.to_thread(self._stop, by))
+        return self._stopping
+
+    def _stop(self, by: int) -> Stopped:
+        ms = getattr(self._rig.backend, "watchdog_ms", None)
+        watchdog = f"within {ms} ms" if ms else ""
+        alive = lambda: os.getppid() == self._parent  # noqa: E731
+        return stop_run(self._parent, self._mailbox, alive, watchdog=watchdog, by=by)
+
+    async def _answer_stop(self, writer: asyncio.StreamWriter) -> None:
+        self._unanswered += 1
+        try:
+            await _send(writer, {"taken": True})
+            stopped = await asyncio.shield(self.stop())
+            await _send(writer, {"end": stopped.end, "said": stopped.said})
+        finally:
+            self._unanswered -= 1
 
     async def _set(self, overrides: Any) -> dict[str, Any]:
         if not isinstance(overrides, list) or not all(isinstance(one, str) for one in overrides):
@@ -155,7 +194,11 @@ class Server:
         return self._mailbox.answer(number)
 
     async def say_goodbye(self) -> None:
-        """Tell whoever watches how the run ended."""
+        """Answer who waits, and tell whoever watches how the run ended."""
+        for _ in range(round(_ANSWERS / _LOOK)):
+            if not self._unanswered:
+                break
+            await asyncio.sleep(_LOOK)
         ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
         for writer in tuple(self._watchers):
             with suppress(OSError):
@@ -167,19 +210,64 @@ async def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> None:
     await writer.drain()
 
 
-async def _live(line: socket.socket, server: Server, parent: int) -> None:
-    """Serve until the line to the run is closed."""
-    path = socket_of(parent)
-    path.unlink(missing_ok=True)  # of a process that had our number before
+class _Watch:
+    """Looks after a run: whether it lives, which signals it was sent, and that its handlers stay in place."""
+
+    def __init__(self, line: socket.socket, server: Server, mailbox: Mailbox) -> None:
+        self._line, self._server, self._mailbox = line, server, mailbox
+        self._closed = asyncio.Event()
+
+    async def until_end(self) -> None:
+        """Return when the run has ended, or its process has, and who waited for that knows."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._line, self._take)
+        for number in SIGNALS:  # a terminal sends them to both
+            loop.add_signal_handler(number, self._server.stop, number)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        rounds = 0
+        while self._server.look() and not self._closed.is_set() and not self._mailbox.ended:
+            rounds += 1
+            if rounds % _HANDLERS == 0:
+                self._mailbox.ask_handlers()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._closed.wait(), _ROUND)
+        await self._server.say_goodbye()
+
+    def _take(self) -> None:
+        """Take the numbers of signals that the run was sent."""
+        try:
+            numbers = self._line.recv(_NUMBERS)
+        except BlockingIOError:
+            return
+        except OSError:
+            numbers = b""
+        if not numbers:  # the run has closed its end
+            asyncio.get_running_loop().remove_reader(self._line)
+            self._closed.set()
+        for number in numbers:
+            if number in SIGNALS:
+                _ = self._server.stop(number)
+
+
+async def _serve(line: socket.socket, server: Server, mailbox: Mailbox, path: Path | None) -> None:
+    """Serve at an address, or only see to the end of the run."""
+    watch = _Watch(line, server, mailbox)
+    if path is None:
+        await watch.until_end()
+        return
+    _remove(path)  # of a process that had our number before
     before = os.umask(0o077)
     listening = await asyncio.start_unix_server(server.serve, path, limit=_LONGEST)
     os.umask(before)
     try:
-        await asyncio.get_running_loop().sock_recv(line, 1)
-        await server.say_goodbye()
+        await watch.until_end()
     finally:
         listening.close()
-        path.unlink(missing_ok=True)
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    path.unlink(missing_ok=True)
 
 
 def main(line: int, setup: int, parent: int) -> None:
@@ -190,7 +278,8 @@ def main(line: int, setup: int, parent: int) -> None:
         prepared: Setup = pickle.load(file)  # noqa: S301 - written by our own parent
         mailbox = Mailbox(mapped(prepared.mailbox, SIZE))
         try:
-            asyncio.run(_live(connection, Server(prepared, mailbox, parent), parent))
+            path = socket_of(parent) if prepared.listen else None
+            asyncio.run(_serve(connection, Server(prepared, mailbox, parent), mailbox, path))
         except (DcmpError, OSError) as error:
-            mailbox.tell_end(str(error).rstrip("."))
+            mailbox.tell_end(str(error).rstrip("."), LIVES)
     os._exit(0)  # connections that are still open would be waited for

@@ -8,6 +8,7 @@ import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.run_end import FORCED, SAID, UNCONFIRMED, WORD
 from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
@@ -15,15 +16,22 @@ if TYPE_CHECKING:
 
     from dcmp_hil.live.change import Change
 
-_WORDS = 8  # of 8 bytes: asked, taken, answer, phase, length, check, length of the last words
-_ASKED, _TAKEN, _ANSWER, _PHASE, _LENGTH, _CHECK, _LAST = range(7)
+_WORDS = 16  # of 8 bytes
+_ASKED, _TAKEN, _ANSWER, _PHASE, _LENGTH, _CHECK, _LAST, _BELL, _STOP, _STOP_TAKEN, _HANDLERS, _END = range(
+    12
+)
 _TIME = struct.Struct("d")
 _TIME_AT, _LAST_AT, _SLOT_AT = 8 * _WORDS, 256, 4096
+BELL = _BELL
+"""Place of the number that tells the loop to look at the others."""
 SIZE = 1 << 16
 """Bytes of a mailbox."""
 
 APPLIED, LOWERING, FAILED = 1, 2, 3
 """Answers."""
+
+STOP = 256
+"""Asks for the end where no signal did, whose numbers are smaller."""
 
 
 class Answer(NamedTuple):
@@ -36,7 +44,8 @@ class Answer(NamedTuple):
 class Mailbox:
     """One slot for a change, one for its answer, and a few words about the run.
 
-    The loop reads one number a period. A change is written before its number is, an answer likewise.
+    The loop reads one number a period, the bell. What is asked for is written before the bell rings, an
+    answer before its number.
 
     Parameters
     ----------
@@ -46,7 +55,7 @@ class Mailbox:
     Attributes
     ----------
     words
-        The numbers, `words[0]` being that of the newest change: what the loop looks at.
+        The numbers; `words[BELL]` is what the loop looks at.
     """
 
     def __init__(self, memory: mmap.mmap | bytearray | None = None) -> None:
@@ -69,7 +78,42 @@ class Mailbox:
         self.memory[_SLOT_AT : _SLOT_AT + len(data)] = data
         self.words[_LENGTH], self.words[_CHECK] = len(data), zlib.crc32(data)
         self.words[_ASKED] += 1
+        self.ring_bell()
         return self.words[_ASKED]
+
+    def ask_stop(self, by: int = STOP) -> None:
+        """Ask the loop for the end of the run, in the name of a signal or of `STOP`; the first one counts."""
+        self.words[_STOP] = self.words[_STOP] or by
+        self.ring_bell()
+
+    def ask_handlers(self) -> None:
+        """Ask the loop to put its signal handlers in again, where something else is there."""
+        self.words[_HANDLERS] += 1
+        self.ring_bell()
+
+    def ring_bell(self) -> None:
+        """Have the loop look at everything else."""
+        self.words[BELL] += 1
+
+    @property
+    def stop_taken(self) -> bool:
+        """Whether the loop knows that it is to end the run."""
+        return bool(self.words[_STOP_TAKEN])
+
+    @property
+    def end(self) -> int:
+        """How the run ended, such as `AT_ZERO`; `LIVES` while it has not."""
+        return self.words[WORD]
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run has ended by itself and said how."""
+        return self.words[WORD] in SAID
+
+    def tell_forced(self) -> None:
+        """Say that signals are sent; a run that ends in order all the same says so later."""
+        if not self.ended:
+            self.words[WORD] = FORCED
 
     def answer(self, number: int) -> Answer | None:
         """Return what became of the change of that number; None as long as nobody took it."""
@@ -107,12 +151,29 @@ class Mailbox:
         _TIME.pack_into(self.memory, _TIME_AT, answer.t)
         self.words[_TAKEN] = number
 
+    @property
+    def asked(self) -> int:
+        """Number of the newest change."""
+        return self.words[_ASKED]
+
+    def take_stop(self) -> int:
+        """Return the signal that asks for the end, or `STOP`; 0 if nothing does. Say that it is known."""
+        if self.words[_STOP]:
+            self.words[_STOP_TAKEN] = 1
+        return self.words[_STOP]
+
+    @property
+    def handlers_asked(self) -> int:
+        """How often the signal handlers were asked for."""
+        return self.words[_HANDLERS]
+
     def tell_phase(self, phase: int) -> None:
         """Say where the run stands."""
         self.words[_PHASE] = phase
 
-    def tell_end(self, sentence: str) -> None:
-        """Say how the run ended."""
+    def tell_end(self, sentence: str, end: int = UNCONFIRMED) -> None:
+        """Say how the run ended: in words, and as a number such as `AT_ZERO`."""
         data = readable(sentence).encode()[: _SLOT_AT - _LAST_AT]
         self.memory[_LAST_AT : _LAST_AT + len(data)] = data
         self.words[_LAST] = len(data)
+        self.words[WORD] = end

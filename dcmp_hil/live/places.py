@@ -9,10 +9,13 @@ from contextlib import suppress
 from pathlib import Path
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.live.mailbox import SIZE, Mailbox
+from dcmp_hil.telemetry.shared import mapped
 from dcmp_hil.user_folder import private, temporary, usable
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 _LONGEST = 80  # characters: the path of a socket may have 107
+_MAILBOX = "memfd:dcmp-hil mailbox"
 _PATIENCE = 0.5  # s to connect in
 
 
@@ -62,6 +65,19 @@ def peer_of(connection: socket.socket) -> tuple[int, int]:
         connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     )
     return pid, uid
+
+
+def mailbox_of(pid: int) -> Mailbox | None:
+    """Return the mailbox of a run by the descriptor that its process holds; None where it may not be seen."""
+    with suppress(OSError):
+        for link in Path(f"/proc/{pid}/fd").iterdir():
+            if link.readlink().name.startswith(_MAILBOX):
+                file = os.open(link, os.O_RDWR)
+                try:
+                    return Mailbox(mapped(file, SIZE))
+                finally:
+                    os.close(file)
+    return None
 
 
 def _alive(path: Path) -> bool:

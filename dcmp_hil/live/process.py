@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import socket
 import subprocess
 import sys
@@ -11,14 +12,18 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.endings import SIGNALS
+from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.live.control import Setup
 from dcmp_hil.live.mailbox import SIZE, Mailbox
+from dcmp_hil.run_end import AT_ZERO, UNCONFIRMED
 from dcmp_hil.telemetry.shared import mapped, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.telemetry.figures import Figures
 
 _LEAVING = 0.5  # s for it to leave in, at the end of a run
 _CODE = """
@@ -32,6 +37,15 @@ main({line}, {setup}, {parent})
 class ControlProcess:
     """Lets `dcmp-hil set`, `stop` and `panel` change a run, from a process that shares nothing with the loop.
 
+    It sees to it that STOP and signals end the run, whatever runs in it.
+
+    Parameters
+    ----------
+    listen
+        Whether others may change the run.
+    unattended
+        Called in the telemetry process where this process has ended by force; see `Control`.
+
     Attributes
     ----------
     mailbox
@@ -40,7 +54,10 @@ class ControlProcess:
         Of the process; None while there is none.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self, *, listen: bool = True, unattended: Callable[[Figures, int, str, str], None] | None = None
+    ) -> None:
+        self._listen, self.unattended = listen, unattended
         self._file, self._setup = reserve(self, "mailbox"), reserve(self, "control")
         self.mailbox = Mailbox(mapped(self._file, SIZE))
         self.pid: int | None = None
@@ -50,34 +67,51 @@ class ControlProcess:
         self._watch = threading.Thread(target=self._wait, name="control", daemon=True)
         self._warn: Callable[[str], None]
 
+    @property
+    def signals(self) -> int:
+        """Descriptor that takes the numbers of signals; -1 while there is none."""
+        return -1 if self._line is None else self._line.fileno()
+
+    @property
+    def file(self) -> int:
+        """Descriptor of the mailbox's memory."""
+        return self._file
+
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Start it; it comes up by itself, in half a second. See `Control`."""
         if ring is None:
             return
         self._warn = warn
-        os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring)))
-        self._line, theirs = socket.socketpair()
+        os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring, self._listen)))
+        line, theirs = socket.socketpair()
+        line.setblocking(False)
         with theirs:
             code = _CODE.format(path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid())
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until it has handlers of its own
             try:
                 self._process = subprocess.Popen(  # noqa: S603 - our own code
                     [sys.executable, "-c", code],
                     pass_fds=[theirs.fileno(), self._setup, self._file, ring],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
-                    start_new_session=True,  # Ctrl-C is the run's to hear
                 )
             except OSError as error:
+                line.close()
                 warn(f"The control process could not be started ({error}): this run cannot be changed.")
                 return
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self._line = line
+        keep_from_forks(line.fileno())
         self.pid = self._process.pid
         self._watch.start()
 
-    def close(self, last_words: str) -> None:
+    def close(self, last_words: str, *, confirmed: bool) -> None:
         """Say how the run ended, and have it leave."""
         self._closing = True
-        self.mailbox.tell_end(last_words)
+        self.mailbox.tell_end(last_words, AT_ZERO if confirmed else UNCONFIRMED)
         if self._line is not None:
+            forget(self._line.fileno())
             self._line.close()
         if self._process is not None:
             self._watch.join(_LEAVING)
@@ -86,7 +120,8 @@ class ControlProcess:
                 self._watch.join(_LEAVING)
 
     def _wait(self) -> None:
-        """Wait for its end, on a thread that the kernel wakes only then."""
+        """Wait for its end, on a thread that the kernel wakes only then, and that signals get through to."""
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         assert self._process is not None  # noqa: S101 - started after it
         with suppress(OSError):
             code = self._process.wait()

@@ -13,10 +13,12 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
+FRESH = 0.5
+"""s, how old the newest period of a run that goes on may be."""
 _PHASES = tuple(phase.value for phase in Phase)
 
 
-def state_of(row: Mapping[str, float], phase: int, rig: Rig) -> dict[str, Any]:
+def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -> dict[str, Any]:
     """Return what JSON can hold.
 
     Parameters
@@ -27,11 +29,15 @@ def state_of(row: Mapping[str, float], phase: int, rig: Rig) -> dict[str, Any]:
         A place in the list of phases.
     rig
         As it runs.
+    age
+        s, since the newest row came. A run that is silent for longer than `FRESH` is in no phase.
     """
+    silent = bool(row) and age > FRESH
     state = {
         "rig": rig.name,
         "t_s": row.get("t"),
-        "phase": _PHASES[phase] if 0 <= phase < len(_PHASES) else "unknown",
+        "age_s": age,
+        "phase": "silent" if silent else _PHASES[phase] if 0 <= phase < len(_PHASES) else "unknown",
         "position_rad": row.get("position"),
         "velocity_rad_s": row.get("velocity_estimate"),
         "reference_rad": row.get("position_reference"),

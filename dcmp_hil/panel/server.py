@@ -18,6 +18,7 @@ from aiohttp import web
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
+from dcmp_hil.live.stopping import End
 from dcmp_hil.panel.door import BACKLOG, Door, Visit
 from dcmp_hil.panel.guard import Guard
 from dcmp_hil.panel.head import BODY_BYTES
@@ -167,8 +168,10 @@ class Panel:
                 raise ConfigError(
                     f"STOP not confirmed: it waited for {waited:.1f} s and was dropped. Press it again."
                 )
-            stop(run)
-            return "STOP: the run ends at 0 V"
+            stopped = stop(run)
+            if stopped.end is End.FAILED:
+                raise ConfigError(stopped.said)
+            return f"STOP: {stopped.said}"
 
         return await asyncio.get_running_loop().run_in_executor(self._stopping, stop_it)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.endings import Interrupted
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
@@ -48,9 +49,9 @@ class CheckedObserver:
         """Return the estimate at `sample.t`; NaN if the observer raises, or returns none of numbers."""
         try:
             estimate = self._update(sample)
-        except DcmpError:
+        except (DcmpError, Interrupted):
             raise
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
             self._failure = self._failure or _raised(self._name, self._update, error, sample.t)
             return _NO_ESTIMATE
         if type(estimate) is Estimate:
@@ -102,9 +103,9 @@ class CheckedController:
         """Return the voltage to ask for, V; NaN if the controller raises, or returns no number."""
         try:
             voltage = self._update(reference, estimate)
-        except DcmpError:
+        except (DcmpError, Interrupted):
             raise
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
             self._failure = self._failure or _raised(self._name, self._update, error)
             return math.nan
         if type(voltage) is float and -math.inf < voltage < math.inf:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.process_log import terminal_copy
 from dcmp_hil.telemetry.answers import end_process, how_it_ended, receive, receive_from_working
@@ -69,6 +70,10 @@ class Apart:
         Told, in a sentence, what the run goes on without.
     model
         What the host believes of the plant.
+    unattended
+        A function, pickled, that the process calls where this one has ended by force; see `Session`.
+    mailbox
+        Descriptor of the memory in which the run says how it ended.
 
     Attributes
     ----------
@@ -92,6 +97,8 @@ class Apart:
         sinks: Sequence[bytes] = (),
         warn: Callable[[str], None] | None = None,
         model: Model = UNKNOWN_MODEL,
+        unattended: bytes = b"",
+        mailbox: int | None = None,
     ) -> None:
         self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
         ring, ledger, self._setup, *kept = self._files
@@ -108,7 +115,10 @@ class Apart:
         self.figures = Figures(statistics, SharedKeeper(self._kept) if self._kept else None)
         self.dropped = 0
         self.pid: int | None = None
-        setup = Setup(_CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model)
+        self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
+        setup = Setup(
+            _CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model, unattended, mailbox
+        )
         self._model = model
         os.write(self._setup, pickle.dumps(setup))
 
@@ -128,6 +138,7 @@ class Apart:
         answer = self._wait_until_up(channel, stopped)
         if answer == UP:
             self._process, self._channel, self.pid = process, channel, process.pid
+            keep_from_forks(channel.fileno())
             self._send_events()
             return
         channel.close()
@@ -149,6 +160,7 @@ class Apart:
         sentence = ""
         if self._process and self._channel:
             with self._channel:
+                forget(self._channel.fileno())
                 sentence = self._finish(self._process, self._channel)
             self._process = self._channel = None
         self._take_over()
@@ -183,7 +195,7 @@ class Apart:
             try:
                 process = subprocess.Popen(  # noqa: S603 - our own code
                     [sys.executable, "-c", code],
-                    pass_fds=[theirs.fileno(), terminal, *self._files],
+                    pass_fds=[theirs.fileno(), terminal, *self._shared],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
                 )

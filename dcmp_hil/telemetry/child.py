@@ -22,6 +22,7 @@ from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.answers import MESSAGE
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
+from dcmp_hil.telemetry.died import how_it_died
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
 from dcmp_hil.telemetry.outlet import THREAD
 from dcmp_hil.telemetry.ring import Ring, size_of
@@ -55,6 +56,10 @@ class Setup:
         Functions that make the others, pickled.
     model
         What the host believes of the plant.
+    unattended
+        A function, pickled, that is called where the run's process has ended by force; nothing for none.
+    mailbox
+        Descriptor of the memory in which the run says how it ended; None if it does not.
     """
 
     capacity: int
@@ -64,6 +69,8 @@ class Setup:
     statistics: Statistics
     sinks: tuple[bytes, ...]
     model: Model
+    unattended: bytes = b""
+    mailbox: int | None = None
 
 
 class State(NamedTuple):
@@ -131,9 +138,16 @@ class _Watcher:
                 if ended:
                     break
         self._say(FIGURES)
+        end = how_it_died(self._setup.mailbox, self._parent)
+        if end:
+            self._tell(Event(self._ring.newest, "ERROR", EventKind.END, end.sentence))
         self._close()
         self._hand_on()
         self._say(DONE)
+        if end and self._setup.unattended:
+            finish = pickle.loads(self._setup.unattended)  # noqa: S301 - written by our own parent
+            if finish is not None:
+                finish(self._figures, self._ring.dropped, end.word, end.sentence)
 
     def _make_sinks(self) -> list[str]:
         warnings: list[str] = []

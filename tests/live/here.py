@@ -24,12 +24,14 @@ class Here:
     def __init__(self) -> None:
         self.mailbox = Mailbox()
         self.last_words = ""
+        self.signals, self.file, self.unattended = -1, None, None
+        self.confirmed = False
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Nothing to start."""
 
-    def close(self, last_words: str) -> None:
-        self.last_words = last_words
+    def close(self, last_words: str, *, confirmed: bool) -> None:
+        self.last_words, self.confirmed = last_words, confirmed
 
 
 class ChangedRun:

@@ -16,6 +16,7 @@ import pytest
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, places
+from dcmp_hil.live.stopping import End
 from tests.live.processes import BOUND, own_folder, started, until, until_running
 
 if TYPE_CHECKING:
@@ -65,13 +66,15 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
             with pytest.raises(ConfigError, match=why):
                 client.change(run.pid, [refused])
         control = _control_of(run.pid)
-        client.stop(run.pid)
+        stopped = client.stop(run.pid)
+        assert stopped.end is End.CONFIRMED
+        assert stopped.said.endswith("Amplifier at 0 V.")
         with suppress(ConfigError):  # it may have left already
             client.stop(run.pid)  # a second one changes nothing
         run.communicate(timeout=BOUND)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
-    assert figures["ended_by"] == "SIGINT"
+    assert figures["ended_by"] == "STOP"
     assert len(figures["changes"]) == 1
     until(lambda: _gone(control), "the control process left", within=1.0)
     assert places.running() == []

@@ -104,7 +104,7 @@ def test_page_changes_a_run_shows_what_was_applied_and_stops_it(tmp_path: Path) 
         assert _complaints(page) == []
     document = json.loads(figures.read_text())
     assert run.returncode == 0
-    assert document["ended_by"] == "SIGINT"
+    assert document["ended_by"] == "STOP"
     assert [change.split(", applied")[0] for change in document["changes"]] == [
         f"controller.kp_1_s2: 4000 -> {applied}",
         "reference.amplitude_rad: 1 -> 0.6",

@@ -1,0 +1,56 @@
+"""A run's figures as a document: what `--json` and summary.json hold."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from dcmp_hil import __version__
+from dcmp_hil.cli import console
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.result import Result
+
+
+def run_document(rig: Rig, note: str, faults: Sequence[str], result: Result, ended_by: str) -> dict[str, Any]:
+    """Return what `--json` writes."""
+    return {
+        **asdict(result.summary),
+        "rig": rig.name,
+        "note": note,
+        "faults": faults,
+        "version": __version__,
+        "ended_by": ended_by,
+        "dropped_periods": result.dropped,
+        "link": _link(result),
+        "device_end": result.device_end and result.device_end._asdict(),
+        "overruns": result.overruns,
+        "outliers": result.outliers,
+        "motor_gain": result.motor_gain and result.motor_gain.document(),
+        "troubles": result.troubles,
+        "changes": result.changes,
+        "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
+        "host": result.host,
+    }
+
+
+def write_json(target: str | None, document: dict[str, Any]) -> list[str]:
+    """Write the file of `--json`; return what went wrong."""
+    if target is None or target == "-":
+        return []
+    try:
+        console.write_json(target, document)
+    except ConfigError as error:
+        return [str(error)]
+    return []
+
+
+def _link(result: Result) -> dict[str, Any] | None:
+    """Return the counters of a link, and what they mean."""
+    if result.link is None:
+        return None
+    return asdict(result.link) | {"warnings": [concern._asdict() for concern in result.link_concerns]}

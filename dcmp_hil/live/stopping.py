@@ -1,0 +1,130 @@
+"""STOP: asked for in the mailbox, confirmed by the last words of the loop, or forced, within a second.
+
+Whoever asks is outside of the run's process: what runs there may be stuck, and may ignore signals.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from contextlib import suppress
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.live.mailbox import STOP
+from dcmp_hil.run_end import AT_ZERO, SAID
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dcmp_hil.live.mailbox import Mailbox
+
+LIMIT = 1.0
+"""s, within which STOP is confirmed or told as failed."""
+_NOT_TAKEN = (0.25, signal.SIGINT), (0.40, signal.SIGTERM), (0.60, signal.SIGKILL)
+_TAKEN = (0.60, signal.SIGINT), (0.70, signal.SIGTERM), (0.80, signal.SIGKILL)
+"""s from STOP to each signal; a loop that has taken it has the time that a device takes to confirm 0 V."""
+_GIVEN_UP = 0.95  # s
+_LOOK = 0.002  # s
+
+
+class End(StrEnum):
+    """What became of STOP."""
+
+    CONFIRMED = "confirmed"  # at 0 V for sure
+    UNCONFIRMED = "unconfirmed"  # the run ended, and the device did not say that it is at 0 V
+    FORCED = "forced"  # the run did not answer and was ended by a signal
+    FAILED = "failed"  # it goes on
+
+
+class Stopped(NamedTuple):
+    """What became of STOP, in a word that stays the same, and in a sentence."""
+
+    end: End
+    said: str
+
+
+def stop_run(
+    pid: int,
+    mailbox: Mailbox,
+    alive: Callable[[], bool],
+    *,
+    watchdog: str = "",
+    by: int = STOP,
+    late: float = 0.0,
+) -> Stopped:
+    """Ask for the end of a run and wait for its last words; where none come, end it by force.
+
+    Parameters
+    ----------
+    pid
+        Of the run's process.
+    mailbox
+        The way to its loop.
+    alive
+        Whether that process is still the run, and is not gone.
+    watchdog
+        What bounds the time that the device takes to 0 V by itself: "within 20 ms".
+    by
+        The signal that asks, where one does.
+    late
+        s, that have passed since the end was asked for in another way.
+    """
+    clock = MonotonicClock()
+    began_ns = clock.now_ns()
+    sent: list[signal.Signals] = []
+    mailbox.ask_stop(by)
+    while True:
+        after = late + 1e-9 * (clock.now_ns() - began_ns)
+        if mailbox.ended:
+            return _last_words(mailbox, after)
+        if not alive():  # it may have said so meanwhile
+            return _gone(sent, after, watchdog) if mailbox.end not in SAID else _last_words(mailbox, after)
+        if after > _GIVEN_UP:
+            return _failed(pid)
+        due = [number for at, number in (_TAKEN if mailbox.stop_taken else _NOT_TAKEN) if at <= after]
+        for number in due[len(sent) :]:
+            mailbox.tell_forced()
+            with suppress(OSError):
+                os.kill(pid, number)
+            sent.append(number)
+        if not mailbox.stop_taken:
+            mailbox.ring_bell()
+        pause(_LOOK)
+
+
+def is_alive(pid: int) -> bool:
+    """Return whether a process is there and has not ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+    except OSError:
+        return False
+    return fields[0] not in {"Z", "X"}
+
+
+def _last_words(mailbox: Mailbox, after: float) -> Stopped:
+    confirmed = mailbox.end == AT_ZERO
+    what = "confirmed" if confirmed else "the run ended"
+    return Stopped(
+        End.CONFIRMED if confirmed else End.UNCONFIRMED,
+        f"{what} after {1e3 * after:.0f} ms: {mailbox.last_words}",
+    )
+
+
+def _gone(sent: list[signal.Signals], after: float, watchdog: str) -> Stopped:
+    within = f" {watchdog}" if watchdog else ""
+    went = f"the device goes to 0 V by its watchdog{within}"
+    if not sent:
+        return Stopped(End.UNCONFIRMED, f"the run's process ended without a word; {went}.")
+    how = "was killed" if sent[-1] is signal.SIGKILL else f"was ended by {sent[-1].name}"
+    return Stopped(End.FORCED, f"the run did not answer and {how} after {1e3 * after:.0f} ms; {went}.")
+
+
+def _failed(pid: int) -> Stopped:
+    return Stopped(
+        End.FAILED,
+        f"STOP is not confirmed: process {pid} cannot be ended, the kernel holds it. Switch the supply of "
+        "the amplifier off.",
+    )

@@ -1,0 +1,52 @@
+"""How the process of a run ended, as the telemetry process sees it: in order, by STOP, or without a word."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.run_end import FORCED, SAID, end_in
+
+_DYING = 5.0  # s for a process whose line has gone to be gone as well
+_LOOK = 0.002  # s
+
+
+class Death(NamedTuple):
+    """In a word that stays the same, and in a sentence."""
+
+    word: str
+    sentence: str
+
+
+_FORCED = Death(
+    "STOP_FORCED",
+    "STOP: the run did not answer and was ended by force; the device goes to 0 V by its watchdog. Look for a "
+    "loop or a wait without end in the class of your own.",
+)
+_DIED = Death(
+    "died",
+    "The run's process ended without a word; the device goes to 0 V by its watchdog. It was killed, or a "
+    "class of your own ended it.",
+)
+
+
+def how_it_died(mailbox: int | None, parent: int) -> Death | None:
+    """Return how the run's process died; None if it lives, and has closed its line in order.
+
+    Parameters
+    ----------
+    mailbox
+        Descriptor of the memory in which the run says how it ended; None if it does not.
+    parent
+        Its process id.
+    """
+    if mailbox is None:
+        return None if os.getppid() == parent else _DIED
+    clock = MonotonicClock()
+    end_ns = clock.now_ns() + int(_DYING * 1e9)
+    while os.getppid() == parent:
+        if end_in(mailbox) in SAID or clock.now_ns() > end_ns:
+            return None
+        pause(_LOOK)
+    return _FORCED if end_in(mailbox) == FORCED else _DIED
