@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What ends a run."""
+TAKEN = 0x80
+"""Added to the number of a signal where Python has handled it, and not only the kernel delivered it."""
 _STOP = "STOP"
 
 
@@ -135,9 +137,9 @@ class StopRequest:
         forced = number == signal.SIGTERM and self.signal is signal.SIGINT
         if (again or forced) and not self._held:
             raise Interrupted
-        if self._woken != -1:  # what waits there may have been replaced, and this has not
+        if self._woken != -1:
             with suppress(OSError):
-                os.write(self._woken, bytes([number]))
+                os.write(self._woken, bytes([number | TAKEN]))
         self.ask(number)
 
     def _leave_alone(self, number: int, handler: Any) -> Any:

@@ -186,11 +186,13 @@ class Session:
         """Make the sinks, here and in a process of their own, before anything is armed or real-time."""
         for sink in self._deferred:
             sink.make()
-        if self._apart:
-            self._apart.open(lambda: self.stop.requested)
         if self._control:
             self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
             self.stop.wake(self._control.signals)
+        if self._apart:
+            self._apart.open(lambda: self.stop.requested)
+        if self._control:
+            self._control.wait_until_up(lambda: self.stop.requested)
         return nullcontext()
 
     def _warn_live(self, sentence: str) -> None:

@@ -134,6 +134,9 @@ class _Setter:
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Nothing to start."""
 
+    def wait_until_up(self, stopped: Callable[[], bool]) -> None:
+        """Nothing to wait for."""
+
     def close(self, last_words: str, *, confirmed: bool) -> None:
         """Nothing to end."""
 

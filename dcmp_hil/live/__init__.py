@@ -40,7 +40,7 @@ class Control(Protocol):
         ...
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
-        """Begin to listen; must not wait.
+        """Begin to come up; must not wait.
 
         Parameters
         ----------
@@ -51,6 +51,10 @@ class Control(Protocol):
         warn
             Told if nobody listens any more; called from any thread.
         """
+        ...
+
+    def wait_until_up(self, stopped: Callable[[], bool]) -> None:
+        """Wait until it sees to the end of the run, before anything is armed; `stopped` ends the waiting."""
         ...
 
     def close(self, last_words: str, *, confirmed: bool) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.clock import MonotonicClock
-from dcmp_hil.endings import SIGNALS
+from dcmp_hil.endings import SIGNALS, TAKEN
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.live.knobs import knobs
 from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
@@ -42,6 +42,7 @@ _SHOWN = 0.1  # s between two states that are sent to whoever watches
 _ROUND = 0.05  # s between two looks at the run: whether it lives, and its newest period
 _HANDLERS = 4  # rounds between two looks of the loop at its signal handlers
 _ANSWERS = 0.3  # s for those who asked for STOP to be answered in, after the end
+_UP = b"u"
 _NUMBERS = 1 << 10  # of signals, that are taken at once
 
 
@@ -121,14 +122,15 @@ class Server:
             async with self._one_at_a_time:
                 await _send(writer, await self._set(request.get("changes")))
         else:
-            await _send(writer, self._state())
+            await _send(writer, self.state())
 
     async def _watch(self, writer: asyncio.StreamWriter) -> None:
         while True:
-            await _send(writer, self._state())
+            await _send(writer, self.state())
             await asyncio.sleep(_SHOWN)
 
-    def _state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
+        """Return where the run stands, and how old that is."""
         age = 1e-9 * (self._clock.now_ns() - self._newest_ns)
         state = state_of(self._ring.latest(), self._mailbox.phase, self._rig, age)
         state |= {"pid": self._parent, "stopping": self._stopping is not None, "knobs": self._knobs}
@@ -224,6 +226,8 @@ class _Watch:
         for number in SIGNALS:  # a terminal sends them to both
             loop.add_signal_handler(number, self._server.stop, number)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        with suppress(OSError):
+            self._line.send(_UP)
         rounds = 0
         while self._server.look() and not self._closed.is_set() and not self._mailbox.ended:
             rounds += 1
@@ -245,8 +249,10 @@ class _Watch:
             asyncio.get_running_loop().remove_reader(self._line)
             self._closed.set()
         for number in numbers:
-            if number in SIGNALS:
-                _ = self._server.stop(number)
+            if number & ~TAKEN in SIGNALS:
+                _ = self._server.stop(number & ~TAKEN)
+            if number & TAKEN:
+                self._mailbox.tell_taken()
 
 
 async def _serve(line: socket.socket, server: Server, mailbox: Mailbox, path: Path | None) -> None:

@@ -105,6 +105,10 @@ class Mailbox:
         """How the run ended, such as `AT_ZERO`; `LIVES` while it has not."""
         return self.words[WORD]
 
+    def tell_taken(self) -> None:
+        """Say that the run knows that it is to end."""
+        self.words[_STOP_TAKEN] = 1
+
     @property
     def ended(self) -> bool:
         """Whether the run has ended by itself and said how."""
@@ -159,7 +163,7 @@ class Mailbox:
     def take_stop(self) -> int:
         """Return the signal that asks for the end, or `STOP`; 0 if nothing does. Say that it is known."""
         if self.words[_STOP]:
-            self.words[_STOP_TAKEN] = 1
+            self.tell_taken()
         return self.words[_STOP]
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import select
 import signal
 import socket
 import subprocess
@@ -12,6 +13,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.endings import SIGNALS
 from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.live.control import Setup
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.figures import Figures
 
+_COMING_UP = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
+_LOOK = 0.1  # s
 _LEAVING = 0.5  # s for it to leave in, at the end of a run
 _CODE = """
 import sys
@@ -78,7 +82,7 @@ class ControlProcess:
         return self._file
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
-        """Start it; it comes up by itself, in half a second. See `Control`."""
+        """Start it; it comes up by itself, in about half a second. See `Control`."""
         if ring is None:
             return
         self._warn = warn
@@ -105,6 +109,14 @@ class ControlProcess:
         keep_from_forks(line.fileno())
         self.pid = self._process.pid
         self._watch.start()
+
+    def wait_until_up(self, stopped: Callable[[], bool]) -> None:
+        """Wait until it listens; not for one that has ended. See `Control`."""
+        clock = MonotonicClock()
+        end_ns = clock.now_ns() + int(1e9 * _COMING_UP)
+        while self._line is not None and self._watch.is_alive() and not stopped():
+            if select.select([self._line], [], [], _LOOK)[0] or clock.now_ns() > end_ns:
+                return
 
     def close(self, last_words: str, *, confirmed: bool) -> None:
         """Say how the run ended, and have it leave."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LIMIT = 1.0
 """s, within which STOP is confirmed or told as failed."""
 _NOT_TAKEN = (0.25, signal.SIGINT), (0.40, signal.SIGTERM), (0.60, signal.SIGKILL)
-_TAKEN = (0.60, signal.SIGINT), (0.70, signal.SIGTERM), (0.80, signal.SIGKILL)
+_TAKEN = (0.50, signal.SIGINT), (0.60, signal.SIGTERM), (0.80, signal.SIGKILL)
 """s from STOP to each signal; a loop that has taken it has the time that a device takes to confirm 0 V."""
 _GIVEN_UP = 0.95  # s
 _LOOK = 0.002  # s

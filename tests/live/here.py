@@ -30,6 +30,9 @@ class Here:
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Nothing to start."""
 
+    def wait_until_up(self, stopped: Callable[[], bool]) -> None:
+        """Nothing to wait for."""
+
     def close(self, last_words: str, *, confirmed: bool) -> None:
         self.last_words, self.confirmed = last_words, confirmed
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import status
+from dcmp_hil.live.places import peer_of, socket_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -66,6 +68,13 @@ def until_running(process: subprocess.Popen[str]) -> None:
     """Wait until a run has full authority."""
     until(lambda: process.poll() is not None or runs(process.pid), "the run got under way")
     assert process.poll() is None, process.communicate()[1]
+
+
+def control_of(pid: int) -> int:
+    """Return the control process of a run."""
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(str(socket_of(pid)))
+        return peer_of(connection)[0]
 
 
 def runs(pid: int) -> bool:

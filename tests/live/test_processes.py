@@ -17,7 +17,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, places
 from dcmp_hil.live.stopping import End
-from tests.live.processes import BOUND, own_folder, started, until, until_running
+from tests.live.processes import BOUND, control_of, own_folder, started, until, until_running
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,12 +30,6 @@ _RUN = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0
 def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with own_folder(monkeypatch):
         yield
-
-
-def _control_of(pid: int) -> int:
-    with socket.socket(socket.AF_UNIX) as connection:
-        connection.connect(str(places.socket_of(pid)))
-        return places.peer_of(connection)[0]
 
 
 def _gone(pid: int) -> bool:
@@ -65,7 +59,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
         ):
             with pytest.raises(ConfigError, match=why):
                 client.change(run.pid, [refused])
-        control = _control_of(run.pid)
+        control = control_of(run.pid)
         stopped = client.stop(run.pid)
         assert stopped.end is End.CONFIRMED
         assert stopped.said.endswith("Amplifier at 0 V.")
@@ -83,7 +77,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
 def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        control = _control_of(run.pid)
+        control = control_of(run.pid)
         os.kill(control, signal.SIGSTOP)
         try:
             client.stop(run.pid)
@@ -98,7 +92,7 @@ def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> No
 def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        os.kill(_control_of(run.pid), signal.SIGKILL)
+        os.kill(control_of(run.pid), signal.SIGKILL)
         until(lambda: not places.running(), "its socket was cleaned up")
         assert run.poll() is None
         run.send_signal(signal.SIGINT)
@@ -112,7 +106,7 @@ def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path
 def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        control = _control_of(run.pid)
+        control = control_of(run.pid)
         run.kill()
         run.communicate(timeout=BOUND)
         until(lambda: _gone(control), "the control process left", within=1.0)
