@@ -51,10 +51,10 @@ class Unattended:
         sentence
             The same, for people.
         """
-        from dcmp_hil.cli.outputs import write_text
         from dcmp_hil.cli.run_document import run_document, write_json
         from dcmp_hil.host import host_facts
         from dcmp_hil.result import Result
+        from dcmp_hil.whole_file import write_text
 
         result = Result(
             rig=self.rig,

@@ -4,7 +4,7 @@ What attacks: a class of the user's own in the process of the run. It sets, igno
 every exception for itself, forks, sleeps in C with the interpreter's lock held, loops for ever, starts
 threads, or ends the process. What is promised: STOP (`dcmp-hil stop`, the panel, Ctrl-C, SIGTERM, SIGHUP) is
 confirmed by the loop's last words or forced within 1 s, the device is at 0 V within 1.1 s, and the run leaves
-complete files. `make stop-bars` counts it 100 times for each kind; here some kinds are met once, each its way.
+complete files. `make stop-bars` counts it 100 times for each kind; here some kinds are met once.
 """
 
 from __future__ import annotations
