@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults mutants firmware bench encoders walk numbers lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench encoders walk numbers lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -71,6 +71,9 @@ faults: $(DEV) ## 100 kinds of fault x 100 seeds, 1,000 healthy runs, 170 real h
 	$(BIN)/python -m tools.host_endings --n $(ENDINGS) \
 		--markdown reports/host-endings.md --json reports/host-endings.json || failed=1; \
 	exit $$failed
+
+fuzz: $(DEV) ## 10 million executions of the firmware's core beside its model, and every branch of it reached
+	@$(BIN)/python -m tools.fuzz $(ARGS)
 
 mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/firmware/mutants.toml says why not
 	@$(BIN)/python -m tools.mutants $(ARGS)

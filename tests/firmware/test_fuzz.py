@@ -1,82 +1,80 @@
-"""The port under mutated streams, with the sanitizers; by libFuzzer too where clang has it."""
+"""The fuzz target: the core agrees with its model, and errors that were put into it are found."""
 
 from __future__ import annotations
 
 import os
-import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.firmware.core_library import BUILDS, CORE, ROOT, WARNINGS, compiler, sources
+from tools.fuzz import campaign
+from tools.fuzz.__main__ import LEAST_TICKS, complaints, figures
+from tools.fuzz.branches import UNREACHED, Reach
+from tools.fuzz.build import CORE, Edit, Workshop, core_files
+from tools.fuzz.campaign import Campaign, Counts, Outcome
+from tools.fuzz.seeded import ERRORS
 
-FUZZ = ROOT / "firmware" / "fuzz"
-EXECUTIONS = 200_000
-FLAGS = [flag for flag in WARNINGS if flag != "-ffreestanding"] + ["-D_POSIX_C_SOURCE=200809L", f"-I{CORE}"]
-
-
-def _build(folder: Path, cc: str, flags: list[str], *files: str) -> Path:
-    program = folder / "fuzz"
-    named = [str(FUZZ / name) for name in files]
-    subprocess.run(
-        [cc, *FLAGS, *flags, *named, *map(str, sources()), "-o", str(program)], check=True, cwd=folder
-    )
-    return program
+EXECUTIONS = 50_000
 
 
-def test_mutated_streams(tmp_path: Path) -> None:
-    program = _build(tmp_path, compiler(), [*BUILDS["sanitized"], "-O2"], "fuzz_main.c", "fuzz_port.c")
-    done = subprocess.run([str(program), str(EXECUTIONS), "1"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-4000:]
-    print(done.stdout)  # noqa: T201
-    ran = re.fullmatch(r"(\d+) executions, (\d+) in RUN, \d+ a second\n", done.stdout)
-    assert ran is not None
-    assert int(ran[1]) == EXECUTIONS
-    assert int(ran[2]) > EXECUTIONS // 10  # else the mutations are too coarse to test what matters
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
+    try:
+        return Workshop(tmp_path_factory.mktemp("fuzz"))
+    except RuntimeError as missing:
+        if os.environ.get("CI") == "true":
+            pytest.fail(str(missing))
+        pytest.skip(str(missing))
 
 
-# Each of these is one line of the core made wrong: a fuzzer that does not see it is not worth its time.
-SABOTAGE = {
-    "voltage outside RUN": ("dcmp_guard.c", "dcmp_amplifier_cut(&device->amplifier);", "(void)device;"),
-    "no hash": ("dcmp_receive.c", "hello.protocol_hash != DCMP_PROTOCOL_HASH", "hello.protocol_hash == 0u"),
-    "no watchdog": ("dcmp_watchdog.c", "> watchdog->time_us", "> 10000000u + watchdog->time_us"),
-    "no clamp": ("dcmp_amplifier.c", "value > high ? high : value", "value > high ? value : value"),
-    "buffer": ("dcmp_cobs.c", "cobs->length == sizeof cobs->bytes", "cobs->length == 20u"),
-}
+def test_every_seeded_error_is_found_and_the_core_has_none(workshop: Workshop, tmp_path: Path) -> None:
+    clean = campaign.run(workshop.program("clean"), tmp_path, runs=EXECUTIONS)
+    assert complaints(clean, EXECUTIONS, None) == [], clean.outcomes[0].wrong
+    assert len(ERRORS) >= 7
+    lived = []
+    for name, seeded in ERRORS.items():
+        program = workshop.program(name, seeded.edit)
+        found = campaign.run(program, tmp_path, runs=seeded.within).outcomes[0]
+        print(f"{name}: {found.executions} executions, {found.wrong}")  # noqa: T201
+        if not found.wrong or found.input is None:
+            lived.append(f"{name}: {seeded.says}, and {seeded.within} executions do not find it")
+        program.unlink()
+    assert not lived
 
 
-@pytest.mark.parametrize("name", SABOTAGE)
-def test_the_fuzzer_finds_a_core_made_wrong(tmp_path: Path, name: str) -> None:
-    file, right, wrong = SABOTAGE[name]
-    copies = []
-    for source in [*sources(), *CORE.glob("*.h")]:
-        text = source.read_text()
-        if source.name == file:
-            assert right in text
-            text = text.replace(right, wrong)
-        (tmp_path / source.name).write_text(text)
-        copies += [str(tmp_path / source.name)] if source.suffix == ".c" else []
-    program = tmp_path / "fuzz"
-    flags = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", f"-I{tmp_path}", *BUILDS["sanitized"]]
-    files = [str(FUZZ / "fuzz_main.c"), str(FUZZ / "fuzz_port.c"), *copies]
-    subprocess.run([compiler(), *flags, *files, "-o", str(program)], check=True, cwd=tmp_path)
-    done = subprocess.run([str(program), "20000", "1"], capture_output=True, check=False)
-    assert done.returncode != 0
+def test_seeded_errors_are_in_different_places_of_the_core() -> None:
+    assert len({(seeded.edit.file, seeded.edit.right) for seeded in ERRORS.values()}) == len(ERRORS)
+    for seeded in ERRORS.values():
+        assert seeded.edit.made() != (CORE / seeded.edit.file).read_text("utf-8")
 
 
-def test_libfuzzer(tmp_path: Path) -> None:
-    """An addition: clang is not needed, but used where it is."""
-    clang = shutil.which("clang")
-    if clang is None:
-        pytest.skip("no clang here: apt install clang (gcc's own driver ran the same target)")
-    probe = [clang, "-fsanitize=fuzzer", "-x", "c", "-", "-o", os.devnull]
-    target = "int LLVMFuzzerTestOneInput(const unsigned char *d, unsigned long n) { return !d && n; }"
-    if subprocess.run(probe, input=target, text=True, capture_output=True, check=False).returncode != 0:
-        pytest.skip("clang has no libFuzzer here: apt install libclang-rt-dev")
-    flags = ["-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
-    program = _build(tmp_path, clang, flags, "fuzz_port.c")
-    command = [str(program), "-runs=100000", "-seed=1", "-max_len=1024", "-verbosity=0"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr[-4000:]
+def test_an_error_whose_place_is_gone_is_told() -> None:
+    with pytest.raises(RuntimeError, match="has 0 times"):
+        Edit("dcmp_guard.c", "no such text", "").made()
+
+
+FEW = Counts(executions=100, ticks=1000, ticks_with_frames=790, in_run=20)
+ENOUGH = FEW._replace(ticks_with_frames=LEAST_TICKS * 100)
+
+
+def of(counts: Counts, wrong: str = "", reached: Reach | None = None) -> list[str]:
+    """Return what is wrong with a campaign of one process that was to do 100 executions."""
+    kept = None
+    return complaints(Campaign((Outcome(counts, wrong, kept, 100),), 1.0, 1.0), 100, reached)
+
+
+def test_what_a_campaign_complains_of() -> None:
+    assert of(ENOUGH) == []
+    assert of(ENOUGH, "a frame is the model's")[0].startswith("found: a frame")
+    assert of(FEW) == ["fewer than 8 ticks with frames in an execution"]
+    assert of(ENOUGH._replace(executions=99)) == ["only 99 executions of 100 in 1 s"]
+    reached = Reach(1, 2, 1, 2, ("dcmp_x.c:3: if (x) {",))
+    assert of(ENOUGH, reached=reached) == ["no input reaches all of dcmp_x.c:3: if (x) {"]
+    assert "800" not in figures(Campaign((Outcome(ENOUGH, "", None, 100),), 2.0, 4.0))
+
+
+def test_lines_that_no_input_reaches_are_lines_of_the_core() -> None:
+    there = {
+        f"{path.name}: {line.strip()}" for path in core_files() for line in path.read_text().splitlines()
+    }
+    assert set(UNREACHED) <= there

@@ -1,0 +1,1 @@
+"""The firmware's core and its model under libFuzzer: `make fuzz`."""
