@@ -23,6 +23,7 @@ from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.probe import probe_for
+from dcmp_hil.speed_window import resolution
 from dcmp_hil.supervisor import Supervisor
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
@@ -137,9 +138,12 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None], first: Sequence[C
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
+        position, velocity = limits.position_limit_rad, limits.velocity_limit_rad_s
+        spare = resolution(rig.encoder.count, rig.period)
+        independent = Ranges(position, velocity, spare, "the supervisor's own observer")
         checks += [
-            Ranges(limits.position_limit_rad, limits.velocity_limit_rad_s),
-            DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2),
+            Ranges(position, velocity, spare),
+            DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent),
         ]
     immediate = limits.start == "immediate"
     probe = (

@@ -45,22 +45,28 @@ class Ranges:
     Parameters
     ----------
     position
-        rad, either way from hanging.
+        rad, either way from hanging: the encoder's own.
     velocity
-        rad/s, either way.
+        rad/s, either way: the estimate's.
+    spare
+        rad/s, what an estimate may show more than the limit: less than that is the encoder's own step.
+    seen_by
+        Whose estimate it is, for the sentence.
     """
 
-    def __init__(self, position: float, velocity: float) -> None:
+    def __init__(
+        self, position: float, velocity: float, spare: float = 0.0, seen_by: str = "the run's observer"
+    ) -> None:
         self._position = position
-        self._velocity = velocity
+        self._velocity, self._most, self._seen_by = velocity, velocity + spare, seen_by
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
         """Object outside the limits."""
-        if not -self._velocity <= estimate.velocity <= self._velocity:
+        if not -self._most <= estimate.velocity <= self._most:
             return Stop(
                 "speed",
-                f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s; "
-                f"the limit is {self._velocity:g} rad/s.",
+                f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s, by "
+                f"{self._seen_by}; the limit is {self._velocity:g} rad/s.",
                 "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
             )
         if not -self._position <= sample.position <= self._position:
@@ -78,7 +84,8 @@ class DisturbanceWatch:
 
     Diverging observers, reversed polarity, a stuck encoder and lost motor power all show as an absurd w_hat:
     first-order filtered over 10 ms it reaches 20 rad/s2 in the worst healthy run, 45 with 1.5 times the
-    motor gain and no soft start.
+    motor gain and no soft start. Its velocity is what the limits are judged by: a limit that believed the
+    observer of the run would be none where that observer is wrong.
 
     Parameters
     ----------
@@ -90,11 +97,19 @@ class DisturbanceWatch:
         rad/s2.
     for_
         s, how long the filtered |w_hat| must stay above the limit.
+    ranges
+        Asked first, with the second observer's estimate; None for no limits.
     """
 
     def __init__(
-        self, observer: Observer, setting: ObserverContext, limit: float, for_: float = 5e-3
+        self,
+        observer: Observer,
+        setting: ObserverContext,
+        limit: float,
+        for_: float = 5e-3,
+        ranges: Ranges | None = None,
     ) -> None:
+        self._ranges = ranges
         self._diagnosis = Diagnosis(setting)
         self._remember, self._update = self._diagnosis.add, observer.update
         self._keep = math.exp(-setting.period / 10e-3)
@@ -104,9 +119,16 @@ class DisturbanceWatch:
         self._above = 0
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - it has its own
-        """Object if the disturbance was too large for too long; the stop can find the likely cause."""
+        """Object outside the limits, or if the disturbance was too large for too long.
+
+        The stop for a disturbance can find the likely cause.
+        """
         self._remember(sample)
-        _, _, w = self._update(sample)
+        seen = self._update(sample)
+        outside = self._ranges.check(sample, seen) if self._ranges else None
+        if outside is not None:
+            return outside
+        w = seen.disturbance
         self._filtered = filtered = w + self._keep * (self._filtered - w)
         if -self._limit <= filtered <= self._limit:
             self._above = 0
@@ -114,13 +136,15 @@ class DisturbanceWatch:
         self._above += 1
         if self._above < self._allowed and filtered == filtered:
             return None
-        seen = (
+        figures = (
             f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
             f"the limit is {self._limit:g} rad/s2."
         )
-        return Stop("disturbance", f"Unknown forces: {seen}", "", explain=partial(self._explanation, seen))
+        return Stop(
+            "disturbance", f"Unknown forces: {figures}", "", explain=partial(self._explanation, figures)
+        )
 
-    def _explanation(self, seen: str) -> Explanation:
+    def _explanation(self, figures: str) -> Explanation:
         """Find the likely cause, which takes longer than 0 V may wait."""
         reason, sentence, remedy = self._diagnosis.finding()
-        return Explanation(reason, f"{sentence}: {seen}", remedy)
+        return Explanation(reason, f"{sentence}: {figures}", remedy)

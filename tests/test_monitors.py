@@ -35,9 +35,10 @@ class _Finds:
 
     def __init__(self, w: float) -> None:
         self.w = w
+        self.velocity = 0.0
 
     def update(self, sample: Sample) -> Estimate:
-        return Estimate(sample.position, 0.0, self.w)
+        return Estimate(sample.position, self.velocity, self.w)
 
 
 def test_finite_lets_a_healthy_period_pass() -> None:
@@ -74,6 +75,22 @@ def test_ranges_object_just_beyond_the_limit_and_not_on_it(sign: float) -> None:
     assert _reason(ranges, sample=_SAMPLE._replace(position=beyond(sign * 6.0, sign * 9))) == "travel"
     assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=sign * 20.0)) == ""
     assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=beyond(sign * 20.0, sign * 99))) == "speed"
+
+
+def test_ranges_leave_an_estimate_what_the_encoder_shows_too_much() -> None:
+    ranges = Ranges(position=6.0, velocity=2.0, spare=0.25)
+    for velocity, reason in ((2.25, ""), (-2.25, ""), (2.26, "speed"), (-2.26, "speed")):
+        assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=velocity)) == reason
+
+
+def test_limits_are_judged_by_the_watch_whatever_the_run_s_observer_says() -> None:
+    observer = _Finds(0.0)
+    watch = DisturbanceWatch(observer, setting(), 50.0, ranges=Ranges(6.0, 2.0, seen_by="the watch"))
+    assert _reason(watch, estimate=Estimate(0.0, 99.0, 0.0)) == ""
+    observer.velocity = -2.1
+    assert _reason(watch, estimate=Estimate(0.0, 0.0, 0.0)) == "speed"
+    observer.velocity = math.nan
+    assert _reason(watch, estimate=Estimate(0.0, 0.0, 0.0)) == "speed"
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
@@ -148,7 +165,7 @@ def test_the_rigs_monitors_trip_in_the_same_period_when_anything_is_not_finite(
 @pytest.mark.parametrize(
     ("key", "sample", "estimate", "reason"),
     [
-        ("velocity_limit_rad_s=3.0", Sample(0.0, 0.0, 0.0), Estimate(0.0, 3.1, 0.0), "speed"),
+        ("velocity_limit_rad_s=3.0", Sample(0.0, 0.0, 0.0), Estimate(0.0, 3.2, 0.0), "speed"),
         ("position_limit_rad=1.0", Sample(0.0, -1.1, 0.0), Estimate(0.0, 0.0, 0.0), "travel"),
     ],
 )

@@ -9,6 +9,7 @@ from dcmp_hil.config.loop_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.config.words import number
 from dcmp_hil.observers.super_twisting import bandwidth_floor
+from dcmp_hil.speed_window import lowest_limit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _COARSEST_ENCODER = 256  # counts a revolution
 _LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
+_FEWEST_COUNTS = 2  # from the encoder's middle to a limit of travel
 _HELD = 0.95  # of the motor's torque
 _LEAST = 1e-6  # of any key that must be above 0
 _REASON = {  # by unit: the largest that anybody may mean
@@ -119,6 +121,8 @@ def _limits_leave_room(rig: Rig) -> str:
     if limits.monitors != "all":
         return ""
     faults = []
+    if limits.start == "immediate" or limits.probe == "off":
+        return ""
     if limits.position_limit_rad < _LEAST_TRAVEL:
         faults.append(
             f"supervisor.position_limit_rad: got {number(limits.position_limit_rad)}; at least "
@@ -130,6 +134,44 @@ def _limits_leave_room(rig: Rig) -> str:
             f"{number(_LEAST_SPEED)} rad/s: the probe before the start moves the arm at up to 1 rad/s."
         )
     return "\n".join(faults)
+
+
+def _limits_can_be_kept(rig: Rig) -> str:
+    """Refuse limits that the encoder does not show; see docs/safety.md."""
+    limits, count = rig.supervisor, rig.encoder.count
+    if limits.monitors != "all":
+        return ""
+    faults = []
+    speed = lowest_limit(count, rig.period)
+    if limits.velocity_limit_rad_s < speed:
+        faults.append(
+            f"supervisor.velocity_limit_rad_s: got {number(limits.velocity_limit_rad_s)}; at least "
+            f"{number(_rounded_up(speed))} rad/s: a speed below two counts of the encoder in 8 ms cannot be "
+            "kept. Raise it, or take a finer encoder."
+        )
+    travel = _FEWEST_COUNTS * count + _way_to_0_V(rig)
+    if limits.position_limit_rad < travel:
+        faults.append(
+            f"supervisor.position_limit_rad: got {number(limits.position_limit_rad)}; at least "
+            f"{number(_rounded_up(travel))} rad: the motor moves the arm as far before the voltage is 0. "
+            "Raise it, or the rate, or lower supervisor.velocity_limit_rad_s."
+        )
+    return "\n".join(faults)
+
+
+def _way_to_0_V(rig: Rig) -> float:
+    """Return how far the arm goes from the sample that shows a limit passed until the voltage is 0, rad.
+
+    At the velocity limit, or as fast as the motor and gravity can make it within a travel of that length.
+    """
+    late = (rig.loop.delay_samples + 1) * rig.period
+    strongest = rig.model.ku_rad_s2_V * rig.amplifier.limit + abs(rig.model.gravity_rad_s2)
+    return min(rig.supervisor.velocity_limit_rad_s * late, 2.0 * strongest * late**2)
+
+
+def _rounded_up(value: float) -> float:
+    """Return a limit that can be written as it is printed."""
+    return math.ceil(1e3 * value - 1e-6) / 1e3
 
 
 def _motor_holds(rig: Rig) -> str:
@@ -204,6 +246,7 @@ RULES: tuple[Callable[[Rig], str], ...] = (
     _supply_gives_limit,
     _encoder_shows_faults,
     _limits_leave_room,
+    _limits_can_be_kept,
     _motor_holds,
     gains_hold,
 )

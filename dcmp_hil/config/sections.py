@@ -137,9 +137,9 @@ class SupervisorSection(Section):
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only (simulation only)."""
     velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0
-    """Trip above this estimated velocity, rad/s. The reference is held 5 % short of it."""
+    """Trip above this velocity, rad/s; kept by host and device. The reference is held 5 % short of it."""
     position_limit_rad: Annotated[float, Field(ge=0.01, le=10_000)] = 6.2832
-    """Trip beyond this position either way, rad. The reference is held 5 % short of it."""
+    """Trip beyond this position either way, rad; kept by host and device. The reference is held 5 % short."""
     error_limit_rad: Annotated[float, Field(ge=0.001, le=10_000)] | Literal["none"] = 1.5
     """End the run when the arm was further off the reference than this for 0.5 s, rad; "none" for never."""
     disturbance_limit_rad_s2: Annotated[float, Field(ge=0.01, le=1e6)] = 50.0

@@ -132,7 +132,8 @@ struct dcmp_output dcmp_device_tick(struct dcmp_device *device, uint32_t now_us,
     const int16_t applied_mV = dcmp_amplifier_voltage(&device->amplifier); /* of the period that ends here */
     device->tick++;
     device->parameters.value[DCMP_TICK] = (int32_t)(device->tick & 0x7FFFFFFFu);
-    dcmp_encoder_tick(&device->encoder, counts, value[DCMP_SPEED_LIMIT_COUNTS_S], value[DCMP_PERIOD_US]);
+    dcmp_encoder_tick(&device->encoder, counts, device->parameters.built[DCMP_SPEED_LIMIT_COUNTS_S],
+                      value[DCMP_PERIOD_US]);
     dcmp_supervisor_event(&device->supervisor, DCMP_EVENT_TICK);
     const bool missed = missed_drive(device);
     dcmp_guard_limits(device);

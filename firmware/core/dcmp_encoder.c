@@ -2,6 +2,7 @@
 
 #define SHORT_US 1000 /* finds a push soon, but a limit below a count or two in it not at all */
 #define LONG_US 8000  /* for these */
+#define LONG (DCMP_WINDOWS - 1u)
 #define SECOND_US 1000000
 #define JUMP_FACTOR 4 /* times the speed limit */
 #define JUMP_FLOOR 8  /* counts: below, a short period would make a jump of every step */
@@ -75,15 +76,18 @@ static bool above(int64_t moved, int64_t spare, int32_t speed_limit, int32_t us)
     return (magnitude(moved) - spare) * SECOND_US > (int64_t)speed_limit * us;
 }
 
-/* The shortest window over which it is too fast; DCMP_WINDOWS if over none. */
-static uint32_t window_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
+static bool too_fast_over(const struct dcmp_encoder *encoder, uint32_t i, const struct dcmp_speed_limits *limits)
+{
+    const struct dcmp_window *window = &encoder->windows[i];
+    const int32_t limit = i == LONG ? limits->session : limits->built; /* a tremble of 2 counts is fast over 1 ms */
+    return above(middle_change(encoder, window->periods), window->spare, limit, window->us);
+}
+
+/* The first window over which it is too fast; DCMP_WINDOWS if over none. */
+static uint32_t window_too_fast(const struct dcmp_encoder *encoder, const struct dcmp_speed_limits *limits)
 {
     uint32_t i = 0;
-    while (i < DCMP_WINDOWS) {
-        const struct dcmp_window *window = &encoder->windows[i];
-        if (above(middle_change(encoder, window->periods), window->spare, speed_limit, window->us)) {
-            break;
-        }
+    while (i < DCMP_WINDOWS && !too_fast_over(encoder, i, limits)) {
         i++;
     }
     return i;
@@ -117,17 +121,17 @@ void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us)
     encoder->origin = 0;
 }
 
-void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t speed_limit, int32_t period_us)
+void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t built_speed_limit, int32_t period_us)
 {
     const int32_t step = encoder->started ? difference(counts, encoder->raw) : 0;
     const int32_t two_steps = encoder->started ? difference(counts, encoder->raw_before) : 0;
     const bool near_a_jump = encoder->jumped;
-    encoder->jumped = is_jump(step, speed_limit, period_us);
+    encoder->jumped = is_jump(step, built_speed_limit, period_us);
     dcmp_history_add(&encoder->jumps, encoder->jumped);
     if (encoder->jumped) {
         encoder->jump = step;
     }
-    if ((near_a_jump || encoder->jumped) && !above(two_steps, 2, speed_limit, 2 * period_us)) {
+    if ((near_a_jump || encoder->jumped) && !above(two_steps, 2, built_speed_limit, 2 * period_us)) {
         encoder->position = past(encoder, 1) + two_steps; /* the count between was wrong */
     } else if (!encoder->jumped) {
         encoder->position += step;
@@ -155,9 +159,9 @@ bool dcmp_encoder_too_jumpy(const struct dcmp_encoder *encoder)
     return encoder->jumped && encoder->jumps.count >= DCMP_JUMP_LIMIT;
 }
 
-bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit)
+bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, const struct dcmp_speed_limits *limits)
 {
-    return window_too_fast(encoder, speed_limit) < DCMP_WINDOWS;
+    return window_too_fast(encoder, limits) < DCMP_WINDOWS;
 }
 
 bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_limit)
@@ -165,9 +169,9 @@ bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_lim
     return magnitude(middle_position(encoder) - encoder->origin) > travel_limit;
 }
 
-int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, int32_t speed_limit)
+int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, const struct dcmp_speed_limits *limits)
 {
-    const struct dcmp_window *window = &encoder->windows[window_too_fast(encoder, speed_limit) % DCMP_WINDOWS];
+    const struct dcmp_window *window = &encoder->windows[window_too_fast(encoder, limits) % DCMP_WINDOWS];
     return nearest(middle_change(encoder, window->periods) * SECOND_US / window->us);
 }
 

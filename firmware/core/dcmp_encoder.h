@@ -21,6 +21,12 @@ struct dcmp_window {
     int32_t us;
 };
 
+/* counts/s: over the short windows what the board was built with holds, over the longest what a session set. */
+struct dcmp_speed_limits {
+    int32_t built;
+    int32_t session;
+};
+
 struct dcmp_encoder {
     uint32_t raw;                 /* the newest count modulo 2^24 */
     uint32_t raw_before;          /* the one before */
@@ -39,18 +45,18 @@ struct dcmp_encoder {
 
 void dcmp_encoder_init(struct dcmp_encoder *encoder, int32_t period_us);
 
-/* The count of a new period. */
-void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t speed_limit, int32_t period_us);
+/* The count of a new period; a jump is what the board was not built for. */
+void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t built_speed_limit, int32_t period_us);
 
 /* Travel counts from here; only the first call does anything. */
 void dcmp_encoder_anchor(struct dcmp_encoder *encoder);
 
 bool dcmp_encoder_too_jumpy(const struct dcmp_encoder *encoder);
-bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, int32_t speed_limit);
+bool dcmp_encoder_too_fast(const struct dcmp_encoder *encoder, const struct dcmp_speed_limits *limits);
 bool dcmp_encoder_too_far(const struct dcmp_encoder *encoder, int32_t travel_limit);
 
 /* For reports: counts/s, counts; the nearest 32-bit number. The speed is the one that is too high, if one is. */
-int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, int32_t speed_limit);
+int32_t dcmp_encoder_speed(const struct dcmp_encoder *encoder, const struct dcmp_speed_limits *limits);
 int32_t dcmp_encoder_travel(const struct dcmp_encoder *encoder);
 
 /* From a count that was given to where the encoder is, the shortest way. */

@@ -64,12 +64,13 @@ static void check_travel(struct dcmp_device *device)
 void dcmp_guard_limits(struct dcmp_device *device)
 {
     const struct dcmp_encoder *encoder = &device->encoder;
-    const int32_t speed_limit = device->parameters.value[DCMP_SPEED_LIMIT_COUNTS_S];
+    const struct dcmp_speed_limits speed_limits = {device->parameters.built[DCMP_SPEED_LIMIT_COUNTS_S],
+                                                   device->parameters.value[DCMP_SPEED_LIMIT_COUNTS_S]};
     if (dcmp_encoder_too_jumpy(encoder)) {
         dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_ENCODER_JUMP, encoder->jump);
     }
-    if (dcmp_encoder_too_fast(encoder, speed_limit)) {
-        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_SPEED, dcmp_encoder_speed(encoder, speed_limit));
+    if (dcmp_encoder_too_fast(encoder, &speed_limits)) {
+        dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_SPEED, dcmp_encoder_speed(encoder, &speed_limits));
     }
     check_travel(device);
 }

@@ -130,9 +130,9 @@ def speed_seed(windows: Callable[[Motion], Sequence[int]], more: int = 0) -> typ
 
     class Speed(Motion):
         def limits(
-            self, jump: int, speed_limit: int, travel_limits: Sequence[tuple[int, int]]
+            self, jump: int, speed_limits: tuple[int, int], travel_limits: Sequence[tuple[int, int]]
         ) -> Iterator[tuple[int, int]]:
-            for code, detail in super().limits(jump, speed_limit, travel_limits):
+            for code, detail in super().limits(jump, speed_limits, travel_limits):
                 seen = (abs(self._moved(periods)) - 1 - more > 0 for periods in windows(self))
                 if code != wire.OVER_SPEED or any(seen):
                     yield code, detail
@@ -186,8 +186,8 @@ SEEDS: dict[str, Row] = {
     "corrupt frames never end RUN": (CorruptIsFine, "can", "corrupt-link"),
     "two corrupt frames end RUN": (TwoCorruptEnd, "can", "corrupt-link"),
     "no speed limit": (NoSpeedLimit, "can", "speed-limit"),
-    "speed over 1 ms only": (speed_seed(lambda m: (m._periods,)), "can", "speed-limit"),
-    "no speed over 8 ms": (speed_seed(lambda m: (m._periods, 2 * m._periods)), "can", "speed-limit"),
+    "a session's speed limit over 1 ms only": (speed_seed(lambda m: (m._periods,)), "can", "speed-limit"),
+    "a session's speed limit over 2 ms only": (speed_seed(lambda m: (2 * m._periods,)), "can", "speed-limit"),
     "speed over 4 ms instead of 8": (ShorterWindow, "can", "speed-limit"),
     "a count too many over 8 ms": (speed_seed(lambda m: (m._long,), more=1), "can", "speed-limit"),
     "the origin of travel is ignored": (OriginIgnored, "can", "travel-origin"),

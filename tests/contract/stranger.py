@@ -145,7 +145,7 @@ class Stranger:
         else:
             self.tick_count += 1
         self._periods += 1
-        jump = self._motion.latch(counts, self.tick_count, self._set[wire.SPEED_LIMIT])
+        jump = self._motion.latch(counts, self.tick_count, self.speed_limit_counts_s)
         noted_mV = self.applied_mV
         for code, detail in self._findings(jump):
             self._trip(code, detail)
@@ -266,7 +266,8 @@ class Stranger:
 
     def _findings(self, jump: int) -> Iterator[tuple[int, int]]:
         if self.state == RUN:
-            yield from self._motion.limits(jump, self._set[wire.SPEED_LIMIT], self._travel_limits())
+            speeds = self.speed_limit_counts_s, self._set[wire.SPEED_LIMIT]
+            yield from self._motion.limits(jump, speeds, self._travel_limits())
         if self.state in {ARMING, RUN} and self._silent_us():
             yield wire.HOST_SILENT, self._silent_us()
         if not self._link_up:

@@ -35,17 +35,17 @@ class Motion:
         """Travel is counted from where this happens first."""
         self._zero = self._travelled() if self._zero is None else self._zero
 
-    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+    def latch(self, counts: int, tick: int, built_speed: int) -> int:
         """Follow the encoder; return the change if it is a jump, else 0."""
         self._now, jumped_before = tick, tick - 1 in self._jumps
         self.raw = counts & 0xFFFFFF
         older, old = (list(self._raws) or [self.raw])[-2:][0], (self._raws or [self.raw])[-1]
         change, over_two = _shortest(counts - old), _shortest(counts - older)
         self._raws.append(self.raw)
-        jump = abs(change) > 8 and abs(change) * 1_000_000 > 4 * speed_limit * self._period_us
+        jump = abs(change) > 8 and abs(change) * 1_000_000 > 4 * built_speed * self._period_us
         if jump:
             self._jumps.append(tick)
-        back = abs(over_two) <= 2 + 2 * speed_limit * self._period_us / 1_000_000
+        back = abs(over_two) <= 2 + 2 * built_speed * self._period_us / 1_000_000
         if back and (jump or jumped_before):
             self._counts.append(self._counts[-2] + over_two)
         else:
@@ -53,14 +53,17 @@ class Motion:
         return change if jump else 0
 
     def limits(
-        self, jump: int, speed_limit: int, travel_limits: Sequence[tuple[int, int]]
+        self, jump: int, speed_limits: tuple[int, int], travel_limits: Sequence[tuple[int, int]]
     ) -> Iterator[tuple[int, int]]:
         """Yield code and detail of each limit that is exceeded."""
         if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 100:
             yield ENCODER_JUMP, jump
-        for periods, more in ((self._periods, 1), (2 * self._periods, 2), (self._long, 1)):
+        built, session = speed_limits
+        for periods, more, limit in (
+            (self._periods, 1, built), (2 * self._periods, 2, built), (self._long, 1, session),
+        ):  # fmt: skip
             moved, span_us = self._moved(periods), periods * self._period_us
-            if (abs(moved) - more) * 1_000_000 > speed_limit * span_us:
+            if (abs(moved) - more) * 1_000_000 > limit * span_us:
                 yield OVER_SPEED, int(moved * 1_000_000 / span_us)
         for origin, limit in travel_limits:
             travel = self._travelled() - (self._zero or 0) if origin < 0 else self._from(origin)

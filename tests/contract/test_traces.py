@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     Limits = Sequence[tuple[int, int]]
+    Speeds = tuple[int, int]
 
 TRACES: dict[str, Any] = {
     path.stem: json.loads(path.read_text("utf-8")) for path in sorted(tool.FOLDER.glob("*.json"))
@@ -141,11 +142,12 @@ class Changed(Motion):
     travel_more = 0
     jumps = 3
 
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         while len(self._jumps) > self.jumps:
             self._jumps.popleft()
         farther = [(origin, limit + self.travel_more) for origin, limit in travel_limits]
-        yield from super().limits(jump, int(speed_limit * self.speed_factor), farther)
+        built, session = (int(limit * self.speed_factor) for limit in speed_limits)
+        yield from super().limits(jump, (built, session), farther)
 
 
 class Slack(Changed):
@@ -171,32 +173,42 @@ class NoMedianOfTravel(Motion):
 
 
 class WithoutTwice(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
-        for code, detail in super().limits(jump, speed_limit, travel_limits):
-            seen = (self._periods, self._long)
-            moved = [(abs(self._moved(periods)) - 1, periods) for periods in seen]
-            if code != 5 or any(m > speed_limit * p * self._period_us * 1e-6 for m, p in moved):
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        for code, detail in super().limits(jump, speed_limits, travel_limits):
+            seen = zip((self._periods, self._long), speed_limits, strict=True)
+            moved = [(abs(self._moved(periods)) - 1, periods, limit) for periods, limit in seen]
+            if code != 5 or any(m > limit * p * self._period_us * 1e-6 for m, p, limit in moved):
                 yield code, detail
 
 
 class ShortWindows(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
-        for code, detail in super().limits(jump, speed_limit, travel_limits):
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        for code, detail in super().limits(jump, speed_limits, travel_limits):
             spans = [(more, more * self._periods) for more in (1, 2)]
             moved = [(abs(self._moved(periods)) - more, periods) for more, periods in spans]
-            if code != 5 or any(m > speed_limit * p * self._period_us * 1e-6 for m, p in moved):
+            if code != 5 or any(m > speed_limits[0] * p * self._period_us * 1e-6 for m, p in moved):
                 yield code, detail
 
 
+class ShortBySession(Motion):
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        yield from super().limits(jump, (speed_limits[1], speed_limits[1]), travel_limits)
+
+
+class LongByBoard(Motion):
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        yield from super().limits(jump, (speed_limits[0], speed_limits[0]), travel_limits)
+
+
 class NoOrigin(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         limit = min(limit for _, limit in travel_limits)
-        yield from super().limits(jump, speed_limit, [(-1, limit)])
+        yield from super().limits(jump, speed_limits, [(-1, limit)])
 
 
 class OriginOnly(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
-        yield from super().limits(jump, speed_limit, travel_limits[:1])
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+        yield from super().limits(jump, speed_limits, travel_limits[:1])
 
 
 class NoMedianFromTheOrigin(Motion):
@@ -205,9 +217,9 @@ class NoMedianFromTheOrigin(Motion):
 
 
 class NoRepair(Motion):
-    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
+    def latch(self, counts: int, tick: int, built_speed: int) -> int:
         before = list(self._counts)
-        jump = super().latch(counts, tick, speed_limit)
+        jump = super().latch(counts, tick, built_speed)
         change = (counts - (self._raw_before if self._raw_before is not None else counts)) % 2**24
         change -= 2**24 * (change >= 2**23)
         self._counts[-1] = before[-1] + (0 if jump else change)
@@ -218,22 +230,22 @@ class NoRepair(Motion):
 
 
 class JumpsAreSpeed(Motion):
-    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
-        return super().latch(counts, tick, 1000 * speed_limit)
+    def latch(self, counts: int, tick: int, built_speed: int) -> int:
+        return super().latch(counts, tick, 1000 * built_speed)
 
 
 class TwoJumps(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         if jump and len(self._jumps) >= 2 and self._now - self._jumps[-2] < 100:
             yield 7, jump
-        yield from super().limits(jump, speed_limit, travel_limits)
+        yield from super().limits(jump, speed_limits, travel_limits)
 
 
 class LongMemory(Motion):
-    def limits(self, jump: int, speed_limit: int, travel_limits: Limits) -> Iterator[tuple[int, int]]:
+    def limits(self, jump: int, speed_limits: Speeds, travel_limits: Limits) -> Iterator[tuple[int, int]]:
         if jump and len(self._jumps) == 3 and self._now - self._jumps[0] < 160:
             yield 7, jump
-        yield from super().limits(jump, speed_limit, travel_limits)
+        yield from super().limits(jump, speed_limits, travel_limits)
 
 
 class NewOrigin(Motion):
@@ -242,13 +254,23 @@ class NewOrigin(Motion):
 
 
 class SixteenBits(Motion):
-    def latch(self, counts: int, tick: int, speed_limit: int) -> int:
-        return super().latch(counts & 0xFFFF, tick, speed_limit)
+    def latch(self, counts: int, tick: int, built_speed: int) -> int:
+        return super().latch(counts & 0xFFFF, tick, built_speed)
 
 
 MOTIONS = (
     *(Slack, Tight, Farther, NoMedian, NoMedianOfTravel, WithoutTwice, NoRepair, JumpsAreSpeed, TwoJumps),
-    *(LongMemory, NewOrigin, SixteenBits, ShortWindows, NoOrigin, OriginOnly, NoMedianFromTheOrigin),
+    *(
+        LongMemory,
+        NewOrigin,
+        SixteenBits,
+        ShortWindows,
+        NoOrigin,
+        ShortBySession,
+        LongByBoard,
+        OriginOnly,
+        NoMedianFromTheOrigin,
+    ),
 )
 
 

@@ -221,12 +221,13 @@ static uint32_t shown(int64_t count)
 static bool noticed(struct dcmp_encoder encoder, int32_t speed_limit, int32_t period_us, int32_t speed, int64_t wrong)
 {
     bool bad = false;
+    const struct dcmp_speed_limits limits = {speed_limit, speed_limit};
     const int32_t periods = (int32_t)DCMP_POSITIONS;
     for (int32_t after = 0; after < periods && !bad; after++) {
         const int64_t count = turned(speed, period_us, after);
         const int64_t travel = count < 0 ? -count : count;
         dcmp_encoder_tick(&encoder, shown(after == 0 ? count + wrong : count), speed_limit, period_us);
-        bad = dcmp_encoder_too_fast(&encoder, speed_limit) || dcmp_encoder_too_jumpy(&encoder) ||
+        bad = dcmp_encoder_too_fast(&encoder, &limits) || dcmp_encoder_too_jumpy(&encoder) ||
               dcmp_encoder_too_far(&encoder, (int32_t)travel) || (after > 0 && encoder.position != count);
     }
     return bad;

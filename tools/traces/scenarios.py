@@ -182,6 +182,8 @@ def over_speed_low(host: Recorder) -> None:
     host.rearm()
     for moved in (0, 1, 1, 1, 1, 1, 1, 1, 2, 1, 1, 1, 1, 1, 1, 1, 0):
         host.run(1, 500, moved=moved)
+    for moved in (3, -2, 3, -2, 12, -12):  # a tremble, and what is no jump for the board
+        host.run(1, 500, moved=moved)
     for moved in (2, 1, 1, 1, 2, 1, 1, 1, 2, 1):
         host.run(1, 500, moved=-moved)
 

@@ -14,6 +14,10 @@ ORIGIN = 16
 OVER_SPEED, OVER_TRAVEL, ENCODER_JUMP = 5, 6, 7
 
 
+def _limits(core: Core, built: int) -> Any:
+    return core.new("struct dcmp_speed_limits *", (built, built))
+
+
 def _tick(bench: Bench, step: int = 0) -> int:
     """Turn, with a host that goes on driving; return the latched code."""
     bench.counts += step
@@ -32,7 +36,7 @@ def test_counters_wrap(core: Core, around: int, direction: int) -> None:
     for i in range(200):
         assert _tick(bench, direction * 10) == 0
         assert bench.sample["position_counts"] == bench.counts % (1 << 24)
-        speed = core.lib.dcmp_encoder_speed(core.ffi.addressof(bench.device.encoder), 40000)
+        speed = core.lib.dcmp_encoder_speed(core.ffi.addressof(bench.device.encoder), _limits(core, 40000))
         assert speed == (direction * 10_000 if i else 0)  # one tick later
     assert bench.device.encoder.position == direction * 2000
 
@@ -86,7 +90,8 @@ def test_a_low_speed_limit_is_found_over_8_ms(
     """A count more than the limit is borne over 8 ms, two are not; over 1 and 2 ms neither shows."""
     allowed = limit * window * period // 1_000_000 + 1
     for extra, code in [(0, 0), (1, OVER_SPEED)]:
-        bench = Bench(core, period_us=period, speed_limit_counts_s=limit, watchdog_ms=50)
+        bench = Bench(core, period_us=period, watchdog_ms=50)
+        _lower_speed(bench, limit)
         bench.arm()
         total, done, codes = allowed + extra, 0, []
         for i in range(1, window + 2 if code else 3 * window):
@@ -99,12 +104,31 @@ def test_a_low_speed_limit_is_found_over_8_ms(
             assert bench.output() == (0, False)
 
 
+def test_over_1_and_2_ms_what_the_board_was_built_with_holds(core: Core) -> None:
+    """A tremble is fast over 1 ms: under a low limit of a session it is none; nor is it a jump."""
+    bench = Bench(core)
+    _lower_speed(bench, 1000)
+    bench.arm()
+    for step in (3, -2, 3, -2, 4, -5, 0, 0, 40, -40, 0, 0, 12, -12, 0, 0, 9, -9, *[0] * 11):
+        assert _tick(bench, step) == 0
+    assert bench.device.encoder.jumps.count == 0
+    assert _tick(bench, 41) == 0
+    assert _tick(bench, 41) == OVER_SPEED  # over 8 ms; over 1 ms it is what the board bears
+    assert bench.fault[1] == 41 * 1000 // 8
+
+
+def _lower_speed(bench: Bench, limit: int) -> None:
+    bench.hello()
+    assert bench.ask("PARAMETER_SET", session=SESSION, id=10, value=limit)["result"] == 0
+
+
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_a_steady_speed_at_a_low_limit_is_borne(core: Core, direction: int) -> None:
     """2 rad/s of 4096 counts, wherever the arm is between two counts; 15 % more is found."""
     for phase in range(10):
         for share, code in [(1.0, 0), (1.15, OVER_SPEED)]:
-            bench = Bench(core, speed_limit_counts_s=1303)
+            bench = Bench(core)
+            _lower_speed(bench, 1303)
             bench.arm()
             start, last = bench.counts, 0
             for i in range(200):
@@ -246,7 +270,7 @@ def test_reports_stop_at_32_bits(core: Core) -> None:
         for ago in range(5):
             encoder.past[-ago % len(encoder.past)] = position + (1 - ago) * change
         assert core.lib.dcmp_encoder_travel(encoder) == travel
-        assert core.lib.dcmp_encoder_speed(encoder, 1 << 30) == speed
+        assert core.lib.dcmp_encoder_speed(encoder, _limits(core, 1 << 30)) == speed
 
 
 @pytest.mark.parametrize("jump", [161, -161, 5000, -100000, 1 << 22])
@@ -410,8 +434,8 @@ def test_the_shortest_period_looks_back_as_far(core: Core) -> None:
         encoder.past[-2 % len(encoder.past)] = farthest
         for ago, position in [(160, 0), (161, 400), (162, 0)]:
             encoder.past[-ago % len(encoder.past)] = position
-        assert core.lib.dcmp_encoder_too_fast(encoder, 40_000) == (speed > 0)
-        assert core.lib.dcmp_encoder_speed(encoder, 40_000) == speed
+        assert core.lib.dcmp_encoder_too_fast(encoder, _limits(core, 40_000)) == (speed > 0)
+        assert core.lib.dcmp_encoder_speed(encoder, _limits(core, 40_000)) == speed
 
 
 @pytest.mark.parametrize("direction", [-1, 1])

@@ -1,0 +1,26 @@
+"""How finely a speed shows: one count of the encoder over the time that speed is taken over."""
+
+from __future__ import annotations
+
+import math
+
+WINDOW = 8e-3  # s, as the device's; docs/protocol.md, section 8
+_FEWEST = 2.0  # counts in it, below which a limit says nothing
+
+
+def resolution(count: float, period: float) -> float:
+    """Return the speed of one count in the window, rad/s.
+
+    Parameters
+    ----------
+    count
+        rad, one count of the encoder; 0 for an ideal one.
+    period
+        s; the window is rounded up to whole periods.
+    """
+    return count / (math.ceil(WINDOW / period - 1e-9) * period)
+
+
+def lowest_limit(count: float, period: float) -> float:
+    """Return the lowest speed limit that can be kept, rad/s; docs/safety.md has the reason."""
+    return _FEWEST * resolution(count, period)

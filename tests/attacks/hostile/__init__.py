@@ -1,0 +1,1 @@
+"""What attacks: classes and scripts that the tests of this folder put into a run."""
