@@ -307,7 +307,7 @@ void model_frame(struct model *model, const struct dcmp_frame *frame)
 void model_judge_tick(struct model *model, uint32_t counts, bool missed)
 {
     const int32_t *value = model->value;
-    motion_tick(&model->motion, counts, value[DCMP_SPEED_LIMIT_COUNTS_S], value[DCMP_PERIOD_US]);
+    motion_tick(&model->motion, counts, model->built[DCMP_SPEED_LIMIT_COUNTS_S], value[DCMP_PERIOD_US]);
     if (model->state == MODEL_BOOT) {
         enter(model, MODEL_IDLE);
     }
@@ -317,6 +317,7 @@ void model_judge_tick(struct model *model, uint32_t counts, bool missed)
     const struct motion_limits limits = {
         .period_us = value[DCMP_PERIOD_US],
         .speed = value[DCMP_SPEED_LIMIT_COUNTS_S],
+        .built_speed = model->built[DCMP_SPEED_LIMIT_COUNTS_S],
         .travel = value[DCMP_TRAVEL_LIMIT_COUNTS],
         .built_travel = model->built[DCMP_TRAVEL_LIMIT_COUNTS],
         .origin = value[DCMP_TRAVEL_ORIGIN_COUNTS],

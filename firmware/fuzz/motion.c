@@ -33,21 +33,21 @@ static int64_t median(int64_t a, int64_t b, int64_t c)
     return (b <= a && a <= c) || (c <= a && a <= b) ? a : c;
 }
 
-void motion_tick(struct motion *motion, uint32_t counts, int64_t speed_limit, int64_t period_us)
+void motion_tick(struct motion *motion, uint32_t counts, int64_t built_speed, int64_t period_us)
 {
     const int32_t one = motion->begun ? shortest(counts - motion->counts[0]) : 0;
     const int32_t two = motion->begun ? shortest(counts - motion->counts[1]) : 0;
     const bool jumped_before = motion->jumped;
     int64_t now = ago(motion, 0);
     motion->tick++;
-    motion->jumped = size(one) > 8 && size(one) * US > 4 * speed_limit * period_us;
+    motion->jumped = size(one) > 8 && size(one) * US > 4 * built_speed * period_us;
     if (motion->jumped) {
         motion->jump = one;
         motion->jumps[2] = motion->jumps[1];
         motion->jumps[1] = motion->jumps[0];
         motion->jumps[0] = motion->tick;
     }
-    if ((motion->jumped || jumped_before) && (size(two) - 2) * US <= 2 * speed_limit * period_us) {
+    if ((motion->jumped || jumped_before) && (size(two) - 2) * US <= 2 * built_speed * period_us) {
         now = ago(motion, 1) + two;
     } else if (!motion->jumped) {
         now += one;
@@ -89,7 +89,8 @@ static uint32_t whole_ticks(int64_t us, int64_t period_us)
     return (uint32_t)((us + period_us - 1) / period_us);
 }
 
-/* Over 1 ms, twice as many ticks, 8 ms: by how many counts may it be more than the speed says. */
+/* Over 1 ms, twice as many ticks, 8 ms: by how many counts may it be more than the speed says. A session's speed holds
+ * over the last of them, the board's own over the others. */
 static struct motion_fault too_fast(const struct motion *motion, const struct motion_limits *limits)
 {
     const uint32_t millisecond = whole_ticks(1000, limits->period_us);
@@ -99,7 +100,7 @@ static struct motion_fault too_fast(const struct motion *motion, const struct mo
     for (uint32_t i = 0; i < 3u && fault.code == 0u; i++) {
         const int64_t way = moved(motion, times[i]);
         const int64_t time_us = times[i] * limits->period_us;
-        if ((size(way) - counts[i]) * US > limits->speed * time_us) {
+        if ((size(way) - counts[i]) * US > (i == 2u ? limits->speed : limits->built_speed) * time_us) {
             fault.code = 5;
             fault.detail = fitting(way * US / time_us);
         }

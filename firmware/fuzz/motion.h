@@ -24,7 +24,8 @@ struct motion {
 /* What a session and a board allow. */
 struct motion_limits {
     int64_t period_us;
-    int64_t speed; /* counts/s */
+    int64_t speed; /* counts/s, over 8 ms */
+    int64_t built_speed; /* over 1 and 2 ms */
     int64_t travel;
     int64_t built_travel;
     int32_t origin; /* that a session gave, -1 for none */
@@ -36,7 +37,7 @@ struct motion_fault {
     int32_t detail;
 };
 
-void motion_tick(struct motion *motion, uint32_t counts, int64_t speed_limit, int64_t period_us);
+void motion_tick(struct motion *motion, uint32_t counts, int64_t built_speed, int64_t period_us);
 void motion_arm(struct motion *motion);
 struct motion_fault motion_judge(const struct motion *motion, const struct motion_limits *limits);
 
