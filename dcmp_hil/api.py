@@ -24,6 +24,7 @@ def run(
     window_from: float = 0.0,
     sinks: Sequence[Sink | SinkMaker] = (),
     faults: Iterable[object] = (),
+    clear: bool = False,
 ) -> Result:
     """Run a rig and return its cycles as columns and its figures.
 
@@ -48,6 +49,8 @@ def run(
         ``Fault("plant.shove", at=2.0, rad_s2=300)`` of `sim_backend.faults.fault`, whose `at` may be a
         function of time and true state. Everything random in them follows from `sim.seed`. Faults of the
         wire and of the firmware need `backend.kind = "sim-board"`.
+    clear
+        Whether a fault of an earlier run that waits for a person is cleared; see `Session`.
 
     Returns
     -------
@@ -65,7 +68,9 @@ def run(
     BackendError
         If the device or the way to it fails; with `.result`.
     """
-    session = Session(rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks, faults=faults)
+    session = Session(
+        rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks, faults=faults, clear=clear
+    )
     try:
         session.run()
     except DcmpError as error:

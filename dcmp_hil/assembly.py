@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
+from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.fault_injection import NO_FAULTS
@@ -57,6 +58,7 @@ def assemble(
     apart: Apart | None = None,
     mailbox: Mailbox | None = None,
     stop: StopRequest | None = None,
+    clear: bool = False,
     faults: Faults = NO_FAULTS,
 ) -> tuple[Line, Recorder]:
     """Make every stage of the line, and the recorder that it reports to.
@@ -67,6 +69,8 @@ def assemble(
         If a class named `module:Class` cannot be found or made.
     """
     backend = open_backend(rig, clock, faults)
+    if isinstance(backend, DeviceBackend):
+        backend.clear = clear
     trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it

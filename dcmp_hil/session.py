@@ -67,6 +67,9 @@ class Session:
         Who may change the run while it goes on; None for nobody.
     faults
         What goes wrong on purpose, as for `run`; or faults that are prepared for this rig already.
+    clear
+        Whether a fault that waits for a person is cleared: STOP by a person, the amplifier's own protection,
+        what the board found wrong with itself. Set it when a person has looked, never by default.
 
     Raises
     ------
@@ -74,7 +77,7 @@ class Session:
         If an argument does not fit the rig.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - each is a choice of its own
         self,
         rig: Rig,
         *,
@@ -87,6 +90,7 @@ class Session:
         warn: Callable[[str], None] | None = None,
         control: Control | None = None,
         faults: Iterable[object] | Faults = (),
+        clear: bool = False,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
@@ -126,6 +130,7 @@ class Session:
             apart=self._apart,
             mailbox=mailbox,
             stop=self.stop,
+            clear=clear,
             faults=inject(rig, faults) if isinstance(faults, Iterable) else faults,
         )
         self._deferred = [sink for sink in here if isinstance(sink, Deferred)]

@@ -65,6 +65,7 @@ class Caller:
         self.sample: SampleReport | None = None  # the newest
         self.tick = tick  # of it; whole once PARAMETER_VALUE(TICK) was heard
         self.fault = 0  # code of the last fault heard of
+        self.fault_detail = 0  # of it
         self.health: Health | None = None  # the newest
         self._first_health: Health | None = None
         self.heard: Counter[str] = Counter()  # messages of this device, by kind
@@ -198,7 +199,7 @@ class Caller:
             self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
             self.ticks.add(message)
         elif isinstance(message, FaultReport):
-            self.fault = message.code
+            self.fault, self.fault_detail = message.code, message.detail
         elif isinstance(message, Health):
             self.health = message
             self._first_health = self._first_health or message

@@ -8,7 +8,7 @@ from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
 from dcmp_hil.faults import name_of
 from dcmp_hil.values import Fault
-from dcmp_hil.wire.messages import Drive, State
+from dcmp_hil.wire.messages import Drive, State, StopReason
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
@@ -17,10 +17,18 @@ if TYPE_CHECKING:
 _REPORT = 0.25  # s: FAULT comes every 100 ms
 _OTHER = 7  # fault class of every code from 7 on
 _SEQ = 0x1FFF
+_OF_A_RUN = (
+    *(Fault.HOST_SILENT, Fault.LINK_DOWN, Fault.CORRUPT_LINK),
+    *(Fault.OVER_SPEED, Fault.OVER_TRAVEL, Fault.ENCODER_JUMP),
+)
+"""Faults that the next run may clear."""
 
 
 class Clearing:
     """Clears the one fault that the device has, and no other.
+
+    Some faults wait for a person: STOP that a person sent, the amplifier's own protection, what the board
+    found wrong with itself, and what the device did not name.
 
     A command may be lost, so `clear` alternates: every 1 that arrives follows a 0 that did.
 
@@ -36,11 +44,15 @@ class Clearing:
         That owns the device.
     ttl_ms
         ms, of the commands.
+    allowed
+        Whether a person has said that faults of every kind may be cleared.
     """
 
-    def __init__(self, name: str, caller: Caller, clock: Clock, session: int, ttl_ms: int) -> None:
+    def __init__(
+        self, name: str, caller: Caller, clock: Clock, session: int, ttl_ms: int, *, allowed: bool = False
+    ) -> None:
         self._name, self._caller, self._clock = name, caller, clock
-        self._session, self._ttl_ms = session, ttl_ms
+        self._session, self._ttl_ms, self._allowed = session, ttl_ms, allowed
 
     def run(self) -> str:
         """Clear the fault; return its name, empty if there was none.
@@ -48,11 +60,13 @@ class Clearing:
         Raises
         ------
         OpenError
-            If it does not clear within 500 ms, or another fault takes its place.
+            If it waits for a person, does not clear within 500 ms, or another fault takes its place.
         """
         code = self._named()
         if not code:
             return ""
+        if not self._allowed and self._waits_for_person(code):
+            raise refusals.latched(self._name, code)
         clear = False
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
@@ -80,6 +94,12 @@ class Clearing:
             return 0
         known = caller.sample.fault_class if caller.sample.fault_class < _OTHER else Fault.UNKNOWN
         return caller.fault or known
+
+    def _waits_for_person(self, code: int) -> bool:
+        """Whether this fault is cleared only where a person has said so."""
+        if code == Fault.STOPPED:  # by a program, at a trip or where samples were missing: as any other fault
+            return self._caller.fault != code or self._caller.fault_detail == StopReason.PERSON
+        return code not in _OF_A_RUN
 
     def _check_same(self, code: int) -> None:
         """Stop where the device names another fault than at the start."""

@@ -77,7 +77,8 @@ class DeviceBackend:
         self._answered = 0  # tick of the SAMPLE that was answered last
         self._meter = LinkMeter(link, 1e9 * rig.period)
         self._rates = terms.warn_share, terms.warn_clock_share
-        self.firmware = self._cleared = ""
+        self.firmware = self._cleared = self._history = ""
+        self.clear = False  # whether a person has said that a latched fault of every kind may be cleared
         self.remarks: tuple[str, ...] = ()  # what a person should know of this device
         self.device_end: DeviceEnd | None = None  # how it was left, as far as it said so
 
@@ -94,12 +95,12 @@ class DeviceBackend:
         self._link.open()
         try:
             caller = Caller(self._link, self._clock, self._node)
-            greeting = Handshake(self._link, caller, self._terms, self._clock).run()
+            greeting = Handshake(self._link, caller, self._terms, self._clock, clear=self.clear).run()
         except BaseException:
             self._link.close()
             raise
         self._session, self.firmware = greeting.session, greeting.firmware
-        self._cleared, self.remarks = greeting.cleared, greeting.remarks
+        self._cleared, self._history, self.remarks = greeting.cleared, greeting.history, greeting.remarks
         self._tick, self._hanging = greeting.tick, greeting.zero
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
@@ -152,7 +153,7 @@ class DeviceBackend:
         """What the device says it is, once it is open."""
         cleared = f", its fault {self._cleared} was cleared" if self._cleared else ""
         firmware = f"firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
-        return f"{self._link.name}, node {self._node}, {firmware}{cleared}"
+        return f"{self._link.name}, node {self._node}, {firmware}, {self._history}{cleared}"
 
     def read(self) -> Sample:
         """Wait for the next SAMPLE and return the newest.

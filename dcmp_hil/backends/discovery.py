@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from dcmp_hil.backends.caller import Caller
+from dcmp_hil.backends.history import history_of
 from dcmp_hil.backends.links import make_link
 from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.config.backends import Can, Serial
@@ -47,16 +48,25 @@ class Finding:
         Keys of `[backend]` that reach the device; empty if there is none.
     device
         What answered, in words.
+    history
+        Its boots, why it was reset, and its fault before that; empty unless asked for.
     """
 
     place: str
     description: str
     settings: tuple[str, ...]
     device: str
+    history: str = ""
 
 
 def find_devices(
-    extra: Sequence[str], baud: int, bitrate: int, clock: Clock, wait: float = LISTEN
+    extra: Sequence[str],
+    baud: int,
+    bitrate: int,
+    clock: Clock,
+    wait: float = LISTEN,
+    *,
+    history: bool = False,
 ) -> Iterator[Finding]:
     """Look at every serial port and CAN channel, and at ports named besides.
 
@@ -73,6 +83,8 @@ def find_devices(
         Times the listening.
     wait
         s, how long a device may take to its first sample.
+    history
+        Whether each device is asked for its past.
 
     Raises
     ------
@@ -84,10 +96,10 @@ def find_devices(
     for path, description in _serial_ports(extra):
         cobs = Serial(kind="serial", port=path, baud=baud)
         slcan = Can(kind="can", interface="slcan", channel=path, baud=baud, bitrate=bitrate)
-        yield from _look_at(path, description, (cobs, slcan), clock, wait)
+        yield from _look_at(path, description, (cobs, slcan), clock, wait, history=history)
     for interface, channel in _can_channels():
         settings = Can(kind="can", interface=interface, channel=channel, bitrate=bitrate)
-        yield from _look_at(f"{interface} {channel}", "CAN", (settings,), clock, wait)
+        yield from _look_at(f"{interface} {channel}", "CAN", (settings,), clock, wait, history=history)
 
 
 def _check_name(path: str) -> None:
@@ -125,16 +137,22 @@ def _can_channels() -> Iterator[tuple[str, str]]:
 
 
 def _look_at(
-    place: str, description: str, ways: Sequence[Serial | Can], clock: Clock, wait: float
+    place: str,
+    description: str,
+    ways: Sequence[Serial | Can],
+    clock: Clock,
+    wait: float,
+    *,
+    history: bool,
 ) -> Iterator[Finding]:
     """Try one way of speaking after the other, until a device is heard."""
     damaged = False
     try:
         for settings in ways:
-            devices, corrupt = _ask(settings, clock, wait)
+            devices, corrupt = _ask(settings, clock, wait, history=history)
             damaged = damaged or corrupt
-            for node, words in devices.items():
-                yield Finding(place, description, _keys(settings, node), words)
+            for node, (words, past) in devices.items():
+                yield Finding(place, description, _keys(settings, node), words, past)
             if devices:
                 return
     except DcmpError as error:
@@ -153,15 +171,19 @@ def _keys(settings: Serial | Can, node: int) -> tuple[str, ...]:
     return tuple(f"{key}={values[key]}" for key in named)
 
 
-def _ask(settings: Serial | Can, clock: Clock, wait: float) -> tuple[dict[int, str], bool]:
-    """Return the devices at the other end, in words, and whether damaged frames came."""
+def _ask(
+    settings: Serial | Can, clock: Clock, wait: float, *, history: bool
+) -> tuple[dict[int, tuple[str, str]], bool]:
+    """Return the devices at the other end and their past, in words, and whether damaged frames came."""
     link = make_link(settings, clock)
     try:
         link.open()
         nodes = _hear_nodes(Caller(link, clock, 0), clock, wait)
-        found = {
-            node: _describe(Caller(link, clock, node), node, twice=twice) for node, twice in nodes.items()
-        }
+        found = {}
+        for node, twice in nodes.items():
+            caller = Caller(link, clock, node)
+            words = _describe(caller, node, twice=twice)
+            found[node] = words, history_of(caller).sentence if history else ""
         return found, link.corrupt > 0
     finally:
         link.close()

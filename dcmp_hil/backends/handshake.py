@@ -11,8 +11,11 @@ from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
 from dcmp_hil.backends.clearing import Clearing
 from dcmp_hil.backends.comparison import differences, remarks
+from dcmp_hil.backends.history import history_of
 from dcmp_hil.backends.parameters import Parameters
 from dcmp_hil.errors import BackendError, ConfigError
+from dcmp_hil.faults import meaning_of
+from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import (
     Drive,
     Hello,
@@ -53,6 +56,7 @@ class Greeting(NamedTuple):
     tick: int  # of the newest SAMPLE, periods since the device's boot
     firmware: str
     cleared: str  # name of a fault of an earlier run; empty for none
+    history: str  # boots, why it was reset, the fault before that
     remarks: tuple[str, ...]  # what a person should know of this device
     zero: int  # count modulo 2^24 at which the arm hangs, as the device was told
 
@@ -70,10 +74,15 @@ class Handshake:
         What the rig says of the device.
     clock
         Times round trips.
+    clear
+        Whether a person has said that a fault of every kind may be cleared.
     """
 
-    def __init__(self, link: Link, caller: Caller, terms: Terms, clock: Clock) -> None:
+    def __init__(
+        self, link: Link, caller: Caller, terms: Terms, clock: Clock, *, clear: bool = False
+    ) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
+        self._clear = clear
         self._session = 1 + secrets.randbelow(0xFFFF)
         self._parameters = Parameters(link.name, caller, self._session)
         self._damaged_before = 0
@@ -99,6 +108,7 @@ class Handshake:
             self._check_round_trip()
             found = self._parameters.compared()
             told = self._compare(found)
+            past = history_of(self._caller)
             self._check_alone()
             self._join_ticks()
             cleared = self._clearing().run()
@@ -116,7 +126,8 @@ class Handshake:
             else:
                 self._give_back()
             raise
-        return Greeting(self._session, self._caller.tick, firmware, cleared, tuple(told), zero)
+        remarks = (*told, *past.remarks, *_about(cleared))
+        return Greeting(self._session, self._caller.tick, firmware, cleared, past.sentence, remarks, zero)
 
     @property
     def _damaged(self) -> int:
@@ -233,7 +244,14 @@ class Handshake:
         raise refusals.impossible(self._link.name, said)
 
     def _clearing(self) -> Clearing:
-        return Clearing(self._link.name, self._caller, self._clock, self._session, self._terms.watchdog_ms)
+        return Clearing(
+            self._link.name,
+            self._caller,
+            self._clock,
+            self._session,
+            self._terms.watchdog_ms,
+            allowed=self._clear,
+        )
 
     def _arm(self) -> None:
         """Answer SAMPLEs at 0 V until one says RUN."""
@@ -263,6 +281,15 @@ class Handshake:
             if _EARLY <= self._caller.tick - told <= _LATE:
                 return
         raise refusals.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
+
+
+def _about(cleared: str) -> tuple[str, ...]:
+    """Name the fault of an earlier run that was cleared."""
+    if not cleared:
+        return ()
+    meaning = meaning_of(Fault[cleared]) if cleared in Fault.__members__ else meaning_of(Fault.UNKNOWN)
+    sentence = f"The device was in fault {cleared} of an earlier run, which was cleared: {meaning.sentence}."
+    return (f"{sentence} {meaning.remedy}",)
 
 
 def _is_tick(answer: ParameterValue) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.backends.caller import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
+from dcmp_hil.faults import meaning_of, name_of
 from dcmp_hil.host import contention
 from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -113,6 +114,15 @@ def faulty(name: str, fault: str) -> OpenError:
     return OpenError(
         f"{name}: the device stays in fault {fault}. Look at what `dcmp-hil monitor` says, mend the "
         "cause, and switch the device off and on."
+    )
+
+
+def latched(name: str, code: int) -> OpenError:
+    """Make the error for a fault that waits for a person."""
+    meaning = meaning_of(code)
+    return OpenError(
+        f"{name}: the device was left in fault {name_of(code)} and keeps it. {meaning.sentence}. "
+        f"{meaning.remedy} Then start once with --clear, `Session(clear=True)` in Python."
     )
 
 

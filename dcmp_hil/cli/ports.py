@@ -25,6 +25,12 @@ def ports(
         float,
         typer.Option(metavar="S", min=0.1, max=60, help="For the first sample: some boards boot first."),
     ] = 0.25,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Say also how often each device booted, why, and its last fault."
+        ),
+    ] = False,
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
@@ -38,10 +44,12 @@ def ports(
     from dcmp_hil.clock import MonotonicClock
 
     found = 0
-    for finding in find_devices(port or (), baud, bitrate, MonotonicClock(), wait):
+    for finding in find_devices(port or (), baud, bitrate, MonotonicClock(), wait, history=verbose):
         found += 1
         console.out.print(Text.assemble((finding.place, "bold"), f"  {finding.description}"))
         console.out.print(Text(f"    {finding.device}", "green" if finding.settings else "dim"))
+        if finding.history:
+            console.out.print(Text(f"    {finding.history}"))
         if finding.settings:
             sets = [word for key in finding.settings for word in ("--set", f"backend.{key}")]
             console.out.print(Text(f"    {shlex.join(['dcmp-hil', 'run', *sets])}"))

@@ -56,6 +56,14 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
             help="Let something go wrong, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
         ),
     ] = None,
+    clear: Annotated[
+        bool,
+        typer.Option(
+            "--clear",
+            help="Clear a fault of the device that waits for a person: STOP by a person, the amplifier's own "
+            "protection, what the board found wrong with itself.",
+        ),
+    ] = False,
     no_control: Annotated[
         bool, typer.Option("--no-control", help="Do not listen for `dcmp-hil set`, `stop` and `panel`.")
     ] = False,
@@ -77,5 +85,6 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         note=readable(note),
         faults=tuple(faults or ()),
         control=not no_control,
+        clear=clear,
     )
     raise typer.Exit(execute(rig, overrides or (), options))

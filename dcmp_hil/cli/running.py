@@ -55,6 +55,7 @@ class Options:
     note: str
     faults: tuple[str, ...] = ()
     control: bool = True
+    clear: bool = False
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
@@ -109,6 +110,7 @@ def _session(
         warn=console.warn,
         control=_control(rig, options, folder),
         faults=faults,
+        clear=options.clear,
     )
 
 

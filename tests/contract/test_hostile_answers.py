@@ -18,6 +18,7 @@ from dcmp_hil.wire.messages import (
     SampleReport,
     State,
     Stop,
+    StopReason,
 )
 from tests.contract.benches import on_bench
 from tests.contract.hooks import on_way_down
@@ -252,7 +253,7 @@ def commands(bench: Bench, lose: Callable[[Drive, int], bool] = lambda *_: False
 def stopped(bench: Bench) -> None:
     """Leave the board in FAULT."""
     bench.board.tick()
-    bench.board.receive_frame(*pack(Stop(3)))
+    bench.board.receive_frame(*pack(Stop(StopReason.SUPERVISOR)))
     assert bench.board.state == State.FAULT
 
 
