@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench encoders walk numbers lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench encoders walk numbers chatter lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -86,6 +86,9 @@ numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulat
 
 walk: $(DEV) ## every command in every combination of its options and outputs; CI asks every pair of options and every output
 	@DCMP_WALK=all $(BIN)/python -m pytest tests/walk $(ARGS)
+
+chatter: $(DEV) ## 1,000 healthy arms and the hard cases: how near their voltage comes to being called chatter
+	@$(BIN)/python -m tools.chatter $(ARGS)
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, cast
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
 from dcmp_hil.backends.device import DeviceBackend
+from dcmp_hil.chatter import Chatter
 from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.limits import Limits
@@ -84,6 +86,7 @@ def assemble(
         backend=backend,
     )
     measured = rig.controller.position == "measured"
+    chatter = make_chatter(rig)
     changes = mailbox and LiveChanges(
         mailbox,
         trajectory,
@@ -92,11 +95,13 @@ def assemble(
         delay=rig.delay,
         notify=recorder.event,
         stop=stop,
+        chatter=chatter,
     )
     outliers = make_outliers(rig)
     stages = ((observer, rig.observer), (controller, rig.controller))
     own = [cast("Check", stage) for stage, section in stages if isinstance(section, Custom)]
-    supervisor = make_supervisor(rig, changes.event if changes else recorder.event, [outliers, *own])
+    notify = changes.event if changes else recorder.event
+    supervisor = make_supervisor(rig, notify, [outliers, *own], chatter)
     line = Line(
         backend=backend,
         outliers=outliers,
@@ -135,9 +140,16 @@ def make_controller(rig: Rig) -> Controller:
     return rig.controller.build(context)
 
 
-def make_supervisor(rig: Rig, notify: Callable[[Event], None], first: Sequence[Check] = ()) -> Supervisor:
+def make_supervisor(
+    rig: Rig,
+    notify: Callable[[Event], None],
+    first: Sequence[Check] = (),
+    chatter: Chatter | None = None,
+) -> Supervisor:
     """Make the supervisor with the checks that `[supervisor]` asks for, behind those that come first."""
+    chatter = chatter or make_chatter(rig)
     limits = rig.supervisor
+    clamps = make_limits(rig, notify)
     checks: list[Check] = [*first, Finite()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
@@ -145,10 +157,10 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None], first: Sequence[C
         position, velocity = limits.position_limit_rad, limits.velocity_limit_rad_s
         spare = resolution(rig.encoder.count, rig.period)
         independent = Ranges(position, velocity, spare, "the supervisor's own observer")
-        checks += [
-            Ranges(position, velocity, spare),
-            DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent),
-        ]
+        second = DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent)
+        chatter.samples = second.samples
+        clamps.watch_variation(chatter)
+        checks += [Ranges(position, velocity, spare), second]
     immediate = limits.start == "immediate"
     probe = (
         None
@@ -157,12 +169,17 @@ def make_supervisor(rig: Rig, notify: Callable[[Event], None], first: Sequence[C
     )
     return Supervisor(
         checks,
-        make_limits(rig, notify),
+        clamps,
         settle=0.0 if immediate else _SETTLE,
         engage=0.0 if immediate else _ENGAGE,
         notify=notify,
         probe=probe,
     )
+
+
+def make_chatter(rig: Rig) -> Chatter:
+    """Make what judges the variation of the voltage by what the rig explains of it."""
+    return Chatter(expected_variation(rig), rig.period, rig.encoder.count)
 
 
 def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from numpy.typing import NDArray
 
@@ -78,6 +78,11 @@ class Diagnosis:
         self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / setting.period)))
         self.add = self._seen.append
         """Remember a sample; called every period, so there is no function around it."""
+
+    @property
+    def samples(self) -> Collection[Sample]:
+        """The last 100 ms."""
+        return self._seen
 
     def finding(self) -> Finding:
         """Say what the last samples look like."""

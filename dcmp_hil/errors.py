@@ -99,6 +99,7 @@ class TripError(DcmpError):
         if self.explain is None:
             return self
         trip = TripError(*self.explain())
+        trip.orderly = self.orderly
         for note in getattr(self, "__notes__", ()):
             trip.add_note(note)
         return trip

@@ -12,6 +12,7 @@ from dcmp_hil.values import Event, EventKind, LimitData, Reference
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.chatter import Chatter
     from dcmp_hil.values import Estimate, Sample
 
 _SAID_EVERY = 1.0  # s, each limit
@@ -93,6 +94,13 @@ class Limits:
         self._saturated = _Lasting(_SATURATED, _IN_A_ROW * period)
         self._astray = _Lasting(_ASTRAY, _IN_A_ROW * period)
         self.clamped = 0
+        self._chatter: Chatter | None = None
+        self._change = 0.0  # V, sum of |dV| in this block
+        self._left = -1  # periods to its end, if it has one
+
+    def watch_variation(self, chatter: Chatter) -> None:
+        """Have the variation of the voltage judged."""
+        self._chatter, self._left = chatter, chatter.block
 
     def reference(self, sample: Sample, reference: Reference) -> Reference:
         """Return the reference, or what of it is allowed; NaN stays, and trips as the demand."""
@@ -105,9 +113,13 @@ class Limits:
     def voltage(self, t: float, demand: float, last: float) -> float:
         """Return the demand, V, or what of it is allowed after `last` V."""
         most = self.voltage_limit
-        if -most <= demand <= most and not self._slews:
-            return demand
-        return self._limited_voltage(t, demand, last)
+        if not -most <= demand <= most or self._slews:
+            demand = self._limited_voltage(t, demand, last)
+        self._change += demand - last if demand > last else last - demand
+        self._left -= 1
+        if not self._left:
+            self._judge_variation(t)
+        return demand
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
         """Object if a limit has acted for too long up to this period."""
@@ -116,6 +128,11 @@ class Limits:
     def slewed(self, voltage: float, last: float) -> float:
         """Return the voltage, or the nearest that the slew allows after `last` V."""
         return max(last - self._step, min(last + self._step, voltage))
+
+    def _judge_variation(self, t: float) -> None:
+        assert self._chatter is not None  # noqa: S101 - without one, no block ends
+        self._stop = self._stop or self._chatter.judge(t, self._change)
+        self._change, self._left = 0.0, self._chatter.block
 
     def _judged(self, sample: Sample, asked: Reference, reference: Reference) -> Reference:
         """Say what of a reference is limited; it is the governed one that the arm may not be off."""

@@ -13,6 +13,8 @@ from dcmp_hil.stop import Stop
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.values import Estimate, Sample
 
@@ -117,6 +119,11 @@ class DisturbanceWatch:
         self._allowed = max(1, round(for_ / setting.period))
         self._filtered = 0.0
         self._above = 0
+
+    @property
+    def samples(self) -> Collection[Sample]:
+        """The last 100 ms."""
+        return self._diagnosis.samples
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - it has its own
         """Object outside the limits, or if the disturbance was too large for too long.

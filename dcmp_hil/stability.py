@@ -33,6 +33,8 @@ _GROWTH = 0.1  # 1/s: what grows more slowly than that is a drift
 _SLIDING = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
 _FARTHEST, _PER_DECADE, _HALVINGS = 1.0, 12, 12  # decades of gain that are searched, steps, refinements
 _DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
+_SLOWEST, _FREQUENCIES = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
+_UNMODELLED = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
 
 
 class LoopSpec(NamedTuple):
@@ -64,6 +66,15 @@ class Margins(NamedTuple):
 
     low: float
     high: float
+
+
+class Robustness(NamedTuple):
+    """What the loop, broken at the motor, has in hand; the least over its crossings of gain 1."""
+
+    phase_deg: float
+    crossover_rad_s: float  # where that is
+    delay_s: float
+    sensitivity: float  # largest magnitude of 1 / (1 + L)
 
 
 class LinearLoop:
@@ -127,6 +138,47 @@ class LinearLoop:
         both = loop[_SENT] @ spread[:, _SENT]
         change = max(0.0, now + next_ - 2.0 * both)
         return noise * math.sqrt(max(0.0, now)), noise * math.sqrt(change)
+
+    def variation_V_s(self) -> float:
+        """Return the mean of |dV/dt| that a count costs, V/s: the steps of the encoder as white noise."""
+        _, change = self.noise_V()
+        return _UNMODELLED * math.sqrt(2.0 / math.pi) * change / self._spec.period
+
+    def response(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return L(exp(j w T)) with the loop broken at the motor; shape (n,), of w in rad/s.
+
+        The state of a period is A0 + m b c with a motor m times as strong as believed, so that
+        det(z - A0 - m b c) = det(z - A0) (1 + m L) with L = -c (z - A0)^-1 b.
+        """
+        still = self.matrix(0.0)[:_NOISE, :_NOISE]
+        both = self.matrix(1.0)[:_NOISE, :_NOISE] - still
+        row = both[_V]
+        column = both[:, np.argmax(np.abs(row))] / row[np.argmax(np.abs(row))]
+        z = np.exp(1j * frequencies * self._spec.period)
+        lines = z[:, None, None] * np.eye(_NOISE) - still
+        solved = np.linalg.solve(lines, np.broadcast_to(column, (len(z), _NOISE))[..., None])[..., 0]
+        return np.asarray(-(solved @ row), np.complex128)
+
+    def robustness(self) -> Robustness | None:
+        """Return margins of phase and delay and the peak of sensitivity; None where it is not stable."""
+        if not self.stable():
+            return None
+        w = np.geomspace(_SLOWEST, math.pi / self._spec.period * (1.0 - 1e-9), _FREQUENCIES)
+        loop = self.response(w)
+        size = np.log(np.abs(loop))
+        at = np.flatnonzero(np.diff(np.sign(size)) != 0.0)
+        share = size[at] / (size[at] - size[at + 1])
+        crossed = w[at] * (w[at + 1] / w[at]) ** share
+        turn = loop[at + 1] / loop[at]
+        phase = np.angle(-loop[at] * np.exp(1j * share * np.angle(turn)))  # over -180 degrees, -pi to pi
+        peak = float(1.0 / np.abs(1.0 + loop).min())
+        if not len(at):
+            return Robustness(math.inf, math.nan, math.inf, peak)
+        least = int(np.argmin(np.abs(phase)))
+        delay = np.where(phase >= 0.0, phase, phase + 2.0 * math.pi) / crossed
+        return Robustness(
+            math.degrees(abs(float(phase[least]))), float(crossed[least]), float(delay.min()), peak
+        )
 
     def _edge(self, way: float) -> float:
         """Search for the end of stability upwards or downwards from 1."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.chatter import FLOOR_V_S
 from dcmp_hil.config.words import number
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers import ObserverContext
@@ -15,6 +17,8 @@ from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.stability import LinearLoop, LoopSpec, bandwidths
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dcmp_hil.config.rig import Rig
 
 _LEAST, _MOST = 0.8, 1.25  # times the believed motor gain, between which the loop must be stable
@@ -42,12 +46,12 @@ _BLAMED = (
 def gains_hold(rig: Rig) -> str:
     """Refuse gains with which the loop runs away, or shakes the motor with the encoder's own steps."""
     fault = _fault(rig)
-    return f"{_blamed(rig)} {fault}" if fault else ""
+    return f"{_blamed(rig)} {fault()}" if fault else ""
 
 
 def holds(rig: Rig) -> bool:
     """Return whether `gains_hold` finds nothing wrong."""
-    return not _fault(rig)
+    return _fault(rig) is None
 
 
 def loops(rig: Rig) -> list[LinearLoop]:
@@ -60,23 +64,35 @@ def loops(rig: Rig) -> list[LinearLoop]:
     return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
 
 
-def _fault(rig: Rig) -> str:
+def _fault(rig: Rig) -> Callable[[], str] | None:
+    """Find what is wrong, and what says it: margins take longer than the question whether there are any."""
     if rig.supervisor.monitors != "all":
-        return ""
-    if isinstance(rig.observer, PaperSettings):
-        return _euler_fault(rig, rig.observer)
+        return None
+    if isinstance(rig.observer, PaperSettings) and (fault := _euler_fault(rig, rig.observer)):
+        return partial(str, fault)
     if isinstance(rig.observer, SuperTwistingSettings) and (fault := _slow_fault(rig, rig.observer)):
-        return fault
+        return partial(str, fault)
     for loop in loops(rig):
         if not (loop.stable() and loop.stable(_LEAST) and loop.stable(_MOST)):
-            return _unstable(loop)
-        noise, _ = loop.noise_V()
-        if math.isfinite(rig.amplifier.limit) and noise > _QUIET * rig.amplifier.limit:
-            return (
-                f"with these gains the encoder's steps alone make the voltage shake by {noise:.2g} V "
-                f"(standard deviation); at most {_QUIET * rig.amplifier.limit:.3g} V, a quarter of "
-                "amplifier.voltage_limit_V. Lower controller.kd_1_s, observer.mu0_rad_s or observer.M_rad_s3."
-            )
+            return partial(_unstable, loop)
+        if math.isfinite(rig.amplifier.limit) and (fault := _rough(loop, rig.amplifier.limit)):
+            return partial(_told, fault, loop)
+    return None
+
+
+def _rough(loop: LinearLoop, limit: float) -> str:
+    """Name what the encoder's steps alone cost, in V and V/s."""
+    (noise, _), variation = loop.noise_V(), loop.variation_V_s()
+    if noise > _QUIET * limit:
+        return (
+            f"with these gains the encoder's steps alone make the voltage shake by {noise:.2g} V "
+            f"(standard deviation); at most {_QUIET * limit:.3g} V, a quarter of amplifier.voltage_limit_V"
+        )
+    if variation >= FLOOR_V_S:
+        return (
+            f"with these gains the encoder's steps alone make the voltage change by {variation:,.0f} V/s on "
+            f"average, and from {FLOOR_V_S:,.0f} V/s on it is chatter"
+        )
     return ""
 
 
@@ -121,14 +137,31 @@ def _euler_fault(rig: Rig, observer: PaperSettings) -> str:
 
 
 def _unstable(loop: LinearLoop) -> str:
-    margins = loop.margins()
+    margins, reserve = loop.margins(), ""
+    if (robust := loop.robustness()) is not None:
+        reserve = f", with a margin of phase of {robust.phase_deg:.0f} degrees"
     needed = f"{number(_LEAST)} to {number(_MOST)} times model.ku_rad_s2_V are needed"
     remedy = "Leave out the gains that were changed to get those that fit, or raise loop.rate_hz."
     if margins is None:
         return f"the loop is not stable with these gains, whatever the motor's: {needed}. {remedy}"
     return (
         f"the loop is stable for motor gains of {margins.low:.2f} to {margins.high:.2f} times "
-        f"model.ku_rad_s2_V only; {needed}. {remedy}"
+        f"model.ku_rad_s2_V only{reserve}; {needed}. {remedy}"
+    )
+
+
+def _told(fault: str, loop: LinearLoop) -> str:
+    """Say a fault, and how far from the edge of stability the loop is."""
+    margins, robust = loop.margins(), loop.robustness()
+    stable = "it is not stable"
+    if margins is not None and robust is not None:
+        stable = (
+            f"it is stable for motor gains of {margins.low:.2f} to {margins.high:.2f} times "
+            f"model.ku_rad_s2_V, with a margin of phase of {robust.phase_deg:.0f} degrees"
+        )
+    return (
+        f"{fault}; {stable}. Lower controller.kd_1_s, observer.mu0_rad_s, observer.L1_1_s or "
+        "observer.M_rad_s3."
     )
 
 
@@ -140,6 +173,6 @@ def _blamed(rig: Rig) -> str:
             continue
         default = type(section).model_fields[name].default
         usual = rig.model_copy(update={table: section.model_copy(update={name: default})})
-        if not _fault(usual):
+        if holds(usual):
             return f"{table}.{name}: got {number(getattr(section, name))};"
     return "controller.kp_1_s2:"

@@ -20,3 +20,4 @@ class Change(NamedTuple):
     gains: Gains | None = None
     tuning: Tuning | None = None
     reference: ReferenceSource | None = None
+    variation: float | None = None  # V/s, that is expected of the voltage afterwards

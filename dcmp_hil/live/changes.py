@@ -14,6 +14,7 @@ from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.chatter import Chatter
     from dcmp_hil.controllers import Controller
     from dcmp_hil.live.change import Change
     from dcmp_hil.live.mailbox import Mailbox
@@ -65,6 +66,8 @@ class LiveChanges:
         Told of every change.
     stop
         Asked for the end where the mailbox says STOP.
+    chatter
+        Told what variation of the voltage is expected afterwards.
 
     Attributes
     ----------
@@ -82,11 +85,12 @@ class LiveChanges:
         delay: float,
         notify: Callable[[Event], None],
         stop: StopRequest | None = None,
+        chatter: Chatter | None = None,
     ) -> None:
         self._mailbox, self._words = mailbox, mailbox.words
         self._trajectory, self._controller, self._observer = trajectory, controller, observer
         self._delay = delay
-        self._notify = notify
+        self._notify, self._chatter = notify, chatter
         self._stop = stop or StopRequest()
         self._seen = mailbox.words[BELL]
         self._number = mailbox.asked
@@ -164,6 +168,8 @@ class LiveChanges:
             cast("_Tuned", self._observer).retune(change.tuning)
         if change.gains is not None:
             self._ramp = _Ramp(cast("_Geared", self._controller), change.gains, t)
+        if change.variation is not None and self._chatter is not None:
+            self._chatter.expect(change.variation)
         return APPLIED
 
 

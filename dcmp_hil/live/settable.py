@@ -10,6 +10,7 @@ from dcmp_hil.config.explain import by_rule, warnings
 from dcmp_hil.config.loop_rules import holds
 from dcmp_hil.config.reach import beyond_reach
 from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.errors import ConfigError
@@ -135,7 +136,8 @@ def _worked_out(before: Rig, after: Rig) -> Change:
         )
     reference = after.reference if after.reference != before.reference else None
     values = _different(before, after)
-    return Change(_in_words(before, values), values, gains, tuning, reference)
+    words = _in_words(before, values)
+    return Change(words, values, gains, tuning, reference, expected_variation(after))
 
 
 def _different(before: Rig, after: Rig) -> dict[str, float | str]:

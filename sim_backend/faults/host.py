@@ -99,6 +99,18 @@ class Diverge(HostFault):
         return estimate._replace(position=x1 + 1e-3 * grown, velocity=x2 + grown, disturbance=w + grown)
 
 
+class Switch(HostFault):
+    """The controller switches between two voltages, as a sign() without a boundary layer does."""
+
+    _periods = 0
+
+    def demand(self, demand: float) -> float:  # noqa: ARG002 - it asks for something else
+        """Return one of the two, by turns."""
+        self._periods += 1
+        up = self._periods // round(self.number("every")) % 2
+        return self.number("V") if up else -self.number("V")
+
+
 class Slow(HostFault):
     """The controller takes its time, now and then, or `times` times at the most."""
 
@@ -150,6 +162,9 @@ HOST = {
         {"where": Choice(("controller", "observer")), "what": Choice(("exception", "base"))},
     ),
     "host.diverge": Kind(Diverge, "the observer diverges", {"factor": Number("", 1.001, 10, 1.5)}),
+    "host.chatter": Kind(
+        Switch, "the controller switches", {"V": Number("V", 0, 1000, 10), "every": Number("", 1, 1000, 1)}
+    ),
     "host.slow": Kind(Slow, "the controller is slow", _pauses(2, 1e6)),
     "host.delay": Kind(Late, "the host wakes up late", _pauses(3, 1)),
     "host.pauses": Kind(Slow, "the host stands still now and then", _pauses(20, 1e6, 0.01)),

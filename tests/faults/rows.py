@@ -162,6 +162,8 @@ HOST = (
     _at_once("host.raise:where=observer", frozenset({"InjectedError"})),
     _at_once("host.raise:where=observer,what=base", frozenset({"InjectedBaseError"})),
     Row("host.diverge:factor=2", PUSHED | NUMBER, 20.0),
+    Row("host.chatter", frozenset({"chatter"}), 700.0),  # ten blocks of 50 ms, then 50 ms to 0 V
+    Row("host.chatter:V=3,every=2", frozenset({"chatter"}), 700.0),
     Row("host.delay:ms=3"),
     Row("host.delay:ms=15"),
     _silent("host.delay:ms=50", STOOD_STILL),

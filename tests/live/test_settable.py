@@ -63,7 +63,7 @@ def test_nothing_is_no_change() -> None:
         changed(bench(), [])
     _, change = changed(bench(), ["controller.kp_1_s2=4000"])
     assert not change.values
-    assert change[2:] == (None, None, None)
+    assert change[2:5] == (None, None, None)
 
 
 def test_class_of_your_own_is_not_settable() -> None:

@@ -1,0 +1,146 @@
+"""Chatter: a voltage that changes far more than these gains, this encoder and this reference explain."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dcmp_hil.errors import Explanation
+from dcmp_hil.stop import Stop, Urgency
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from dcmp_hil.values import Sample
+
+FLOOR_V_S = 1000.0
+"""V/s, below which nothing is chatter."""
+_TIMES = 10.0  # the expected variation, from which on it is chatter
+BLOCK = 0.05  # s, over which the variation is a mean
+_BLOCKS = 10  # half a second
+_GAP = 0.5  # of what is allowed: two blocks below it are a pause
+_BURST, _PAUSE, _BURSTS = 2, 1, 40  # blocks of bursts with pauses: how they count, up to when
+_FEWEST = 12  # samples that say anything
+_SWING_COUNTS, _SWING_RAD = 10.0, 5e-3  # of the arm, peak to peak
+_DRIFT, _LAGS = 3, 4  # order of what is no swing; periods from a count to the voltage that it makes
+_FOLLOWS = 0.5  # correlation
+
+
+class Chatter:
+    """Judges the variation of the voltage sent, block by block.
+
+    Parameters
+    ----------
+    expected
+        V/s, mean of |dV/dt| that gains, encoder and reference explain.
+    period
+        s, nominal.
+    count
+        rad, one count of the encoder; 0 for an ideal one.
+
+    Attributes
+    ----------
+    block
+        Periods of a block.
+    samples
+        The newest samples, for the diagnosis.
+    """
+
+    def __init__(self, expected: float, period: float, count: float) -> None:
+        self.block = max(1, round(BLOCK / period))
+        self.samples: Collection[Sample] = ()
+        self._count = count
+        self._rates: deque[float] = deque(maxlen=_BLOCKS + 1)  # V/s, of the newest blocks
+        self._bursts = 0
+        self._t = math.nan
+        self._expected = self._limit = math.nan
+        self.expect(expected)
+
+    def expect(self, variation: float) -> None:
+        """Take what other gains make of the expected variation, V/s."""
+        self._expected, self._limit = variation, limit_V_s(variation)
+
+    def judge(self, t: float, change: float) -> Stop | None:
+        """Take the sum of |dV| of a block (V) that ends at device time `t`, s; object to chatter.
+
+        That is half a second with a mean from the limit on and no pause in it; or bursts, for longer.
+        """
+        gone, self._t = t - self._t, t
+        if not gone > 0.0:  # the first
+            return None
+        self._rates.append(change / gone)
+        rates, quiet = list(self._rates), 2.0 * _GAP * self._limit
+        mean = sum(rates[-_BLOCKS:]) / _BLOCKS
+        goes_on = mean >= self._limit and sum(rates[-2:]) >= quiet
+        self._bursts = self._bursts + _BURST if goes_on else max(0, self._bursts - _PAUSE)
+        steady = goes_on and len(rates) > _BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
+        return self._stop(t, mean) if steady or self._bursts >= _BURSTS else None
+
+    def _stop(self, t: float, mean: float) -> Stop:
+        said = (
+            f"it changed by {mean:,.0f} V/s on average in the half second before t = {t:.3f} s; "
+            f"{self._expected:,.0f} V/s are expected with this rig, {self._limit:,.0f} allowed."
+        )
+        sentence, remedy = _CONTROLLER
+        explain = partial(self._explanation, said)
+        return Stop("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
+
+    def _explanation(self, said: str) -> Explanation:
+        """Find what the voltage follows."""
+        sentence, remedy = cause_of(self.samples, self._count)
+        return Explanation("chatter", f"{sentence}: {said}", remedy)
+
+
+def limit_V_s(expected: float) -> float:
+    """Return the variation from which on it is chatter, V/s."""
+    return max(FLOOR_V_S, _TIMES * expected)
+
+
+_CONTROLLER = (
+    "The voltage chatters, and neither the arm nor the encoder explains it",
+    "Look for a controller that switches, such as a sign() without a boundary layer, and for its gains.",
+)
+_ENCODER = (
+    "The voltage chatters with the steps of the encoder",
+    "Lower the gains (controller.kd_1_s, observer.mu0_rad_s, L1_1_s, M_rad_s3), and look at the encoder.",
+)
+_SWING = (
+    "The voltage chatters because the loop swings",
+    "Lower the gains, and compare model.ku_rad_s2_V and loop.delay_samples with the rig.",
+)
+
+
+def cause_of(samples: Collection[Sample], count: float) -> tuple[str, str]:
+    """Say what a chattering voltage looks like, and what to look at first.
+
+    Parameters
+    ----------
+    samples
+        The newest ones, with the voltages applied.
+    count
+        rad, one count of the encoder; 0 for an ideal one.
+    """
+    if len(samples) < _FEWEST:
+        return _CONTROLLER
+    t, position, voltage, _ = np.array(list(samples), float).T
+    if not (np.isfinite(t + position + voltage).all() and (np.diff(t) > 0.0).all()):
+        return _CONTROLLER
+    moved = position - np.polyval(np.polyfit(t - t[0], position, _DRIFT), t - t[0])
+    change, step = np.diff(voltage), np.diff(position)
+    smooth = min(_correlation(voltage[1:], voltage[:-1]), _correlation(step[1:], step[:-1]))
+    if smooth > _FOLLOWS and float(np.ptp(moved)) > max(_SWING_COUNTS * count, _SWING_RAD):
+        return _SWING
+    follows = max(abs(_correlation(change[lag:], step[: len(step) - lag])) for lag in range(_LAGS))
+    return _ENCODER if follows > _FOLLOWS else _CONTROLLER
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the correlation; 0 where one of the two does not vary."""
+    if not (one.std() > 0.0 and other.std() > 0.0):
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])

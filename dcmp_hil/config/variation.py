@@ -1,0 +1,54 @@
+"""How much the voltage of a rig should vary: what its encoder costs with its gains, and its reference."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dcmp_hil.config.loop_rules import loops
+from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+
+if TYPE_CHECKING:
+    from dcmp_hil.config.rig import Rig
+
+_ROUGH = 10.0  # times the rule's, that the paper's Euler steps and an observer of one's own may cost
+_HORIZON, _WINDOW, _WINDOWS, _LOOKS = 60.0, 0.5, 120, 30  # s; s; of the reference, and instants in each
+
+
+def expected_variation(rig: Rig) -> float:
+    """Return the mean of |dV/dt| that gains, encoder and reference explain, V/s.
+
+    The gains are judged by the linear loop. A controller of one's own is taken for the one of the default
+    gains; the paper's observer, and one of one's own, for ten times as rough as `super_twisting` by its rule.
+    """
+    usual: dict[str, object] = {}
+    if not isinstance(rig.controller, PdSettings):
+        usual["controller"] = PdSettings(position=getattr(rig.controller, "position", "estimated"))
+    rough = not isinstance(rig.observer, SuperTwistingSettings)
+    if rough:
+        usual["observer"] = SuperTwistingSettings()
+    found = [loop.variation_V_s() for loop in loops(rig.model_copy(update=usual))]
+    noise = max((one for one in found if math.isfinite(one)), default=0.0)
+    return (_ROUGH if rough else 1.0) * noise + _of_reference(rig)
+
+
+def _of_reference(rig: Rig) -> float:
+    """Return the largest mean of |dV/dt| in a window that following the reference takes, V/s."""
+    most, step = 0.0, rig.period
+    for window in range(_WINDOWS):
+        begin = window * _HORIZON / _WINDOWS
+        changes = [
+            abs(_voltage(rig, t + step) - _voltage(rig, t))
+            for t in (begin + k * _WINDOW / _LOOKS for k in range(_LOOKS))
+        ]
+        most = max(most, sum(changes) / (_LOOKS * step))
+    return most if math.isfinite(most) else 0.0
+
+
+def _voltage(rig: Rig, t: float) -> float:
+    """Return what the believed pendulum needs to be at the reference, within the amplifier's limit, V."""
+    x, v, a = rig.reference.at(t)
+    model = rig.model.values()
+    volts = (a + model.f0 * v + model.gravity * math.sin(x)) / model.ku
+    return max(-rig.amplifier.limit, min(rig.amplifier.limit, volts))
