@@ -24,10 +24,10 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench encoders walk numbers chatter lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench encoders walk numbers chatter stop-bars lock lockcheck clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 run: $(RUN) ## the simulated rig with its dashboard; ARGS="--help" for what else it takes
 	@$(BIN)/dcmp-hil run bench-1khz $(ARGS)
@@ -92,6 +92,9 @@ chatter: $(DEV) ## 1,000 healthy arms and the hard cases: how near their voltage
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)
+
+stop-bars: $(DEV) ## STOP against controllers that are bad to their run, 100 each; ARGS="--n 10 --jobs 2"
+	@$(BIN)/python -m tools.stop_bars $(ARGS)
 
 bench: $(DEV) ## measure, print a table
 	@$(BIN)/python -m tools.bench $(ARGS)
