@@ -60,7 +60,7 @@ void dcmp_parameters_init(struct dcmp_parameters *parameters, const struct dcmp_
     parameters->value[DCMP_TRAVEL_ORIGIN_COUNTS] = DCMP_FIRST_ARMING;
     settable(parameters, DCMP_VOLTAGE_LIMIT_MV, 1, config->voltage_limit_mV);
     settable(parameters, DCMP_SLEW_MV_PER_MS, 1, config->slew_mV_per_ms == 0 ? INT32_MAX : config->slew_mV_per_ms);
-    settable(parameters, DCMP_WATCHDOG_MS, DCMP_WATCHDOG_MIN_MS, DCMP_WATCHDOG_MAX_MS);
+    settable(parameters, DCMP_WATCHDOG_MS, DCMP_WATCHDOG_MIN_MS, config->watchdog_ms);
     settable(parameters, DCMP_SPEED_LIMIT_COUNTS_S, 1, config->speed_limit_counts_s);
     settable(parameters, DCMP_TRAVEL_LIMIT_COUNTS, 1, config->travel_limit_counts);
     settable(parameters, DCMP_TRAVEL_ORIGIN_COUNTS, DCMP_FIRST_ARMING, (int32_t)DCMP_COUNT_MASK);

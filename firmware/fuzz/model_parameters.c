@@ -23,7 +23,6 @@ static bool range_of(const struct model *model, uint32_t id, int32_t *lowest, in
         return true;
     case DCMP_WATCHDOG_MS:
         *lowest = 5;
-        *highest = 50;
         return true;
     case DCMP_TRAVEL_ORIGIN_COUNTS:
         *lowest = -1;

@@ -50,8 +50,8 @@ const char *watch_output(struct watch *watch, const struct dcmp_config *config, 
     if (watch->armed < ARMING_DRIVES) {
         return "ENABLE without ten DRIVEs that arm, or after a STOP";
     }
-    if (now_us - watch->driven_us > 50000u) {
-        return "ENABLE, and the host is silent for longer than any watchdog's time";
+    if (now_us - watch->driven_us > 1000u * (uint32_t)config->watchdog_ms) {
+        return "ENABLE, and the host is silent for longer than the board was built for";
     }
     return watch->link_down ? "ENABLE, and the link is down" : NULL;
 }

@@ -14,12 +14,23 @@ if TYPE_CHECKING:
 SIMULATED, NATIVE = 1, 2  # the parameter BOARD
 VERSION = 0x0001  # 0.1
 _WATCHDOG_MS = 20
+_LONGEST_WATCHDOG_MS = 50  # of the protocol
 _REV_S, _REV = 8, 4  # the board's own limits: revolutions a second, revolutions either way
 _MOST_MV = 32_767  # what the wire can say
 
 
 LAYOUT = struct.Struct("@13iHB?")
 """Of `struct dcmp_config`: the values of `board_config`, in their order."""
+
+
+def _watchdog_ms(rig: Rig, board: int) -> int:
+    """Return the longest that a host may ask for.
+
+    A virtual board allows what any device may, so that it fits every rig; a real one is built for its own.
+    """
+    if board in (SIMULATED, NATIVE):
+        return _LONGEST_WATCHDOG_MS
+    return getattr(rig.backend, "watchdog_ms", _WATCHDOG_MS)
 
 
 def board_config(rig: Rig, board: int) -> dict[str, int]:
@@ -46,7 +57,7 @@ def board_config(rig: Rig, board: int) -> dict[str, int]:
         "period_us": round(1e6 * rig.period),
         "voltage_limit_mV": round(min(1e3 * rig.amplifier.limit, _MOST_MV)),
         "slew_mV_per_ms": 0 if math.isinf(slew) else max(1, round(slew)),
-        "watchdog_ms": _WATCHDOG_MS,
+        "watchdog_ms": _watchdog_ms(rig, board),
         "speed_limit_counts_s": _REV_S * counts,
         "travel_limit_counts": _REV * counts,
         "last_fault": 0,

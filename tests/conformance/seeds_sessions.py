@@ -174,6 +174,13 @@ def _beyond(asked: dict[str, Any]) -> int | None:
     return wire.OK
 
 
+def _longer_watchdog(asked: dict[str, Any]) -> int | None:
+    if asked["id"] != wire.WATCHDOG or not 5 <= asked["value"] <= 50:
+        return None
+    asked["device"]._set[wire.WATCHDOG] = asked["value"]
+    return wire.OK
+
+
 def _always(name: str) -> Callable[[dict[str, Any]], int | None]:
     def change(asked: dict[str, Any]) -> int | None:
         asked[name] = True
@@ -230,6 +237,7 @@ SEEDS: dict[str, Row] = {
     "an unknown parameter is 0, OK": (UnknownIsZero, "can", "parameters-unknown"),
     "the period can be set": (change_seed(_any_parameter), "can", "parameters-read-only"),
     "a limit can be raised": (change_seed(_beyond), "can", "parameters-range"),
+    "the watchdog's time can be raised": (change_seed(_longer_watchdog), "can", "parameters-range"),
     "anyone may set parameters": (change_seed(_always("owner")), "can", "parameters-owner"),
     "the wrong reason is answered": (change_seed(_reason_order), "can", "parameters-owner"),
     "parameters may be set in FAULT": (change_seed(_always("idle")), "can", "parameters-idle"),

@@ -220,7 +220,6 @@ class Parameters:
         )
         self._highest = limits | {
             SLEW: limits[SLEW] or LARGEST,
-            WATCHDOG: 50,
             EDGE_STAMPS: 0,  # no stamps here
             TRAVEL_ORIGIN: 2**24 - 1,
         }

@@ -64,6 +64,15 @@ ERRORS: dict[str, Seeded] = {
         Edit("dcmp_encoder.c", "/ period_us, 1, period_us)", "/ period_us, 2, period_us)"),
         1_000_000,
     ),
+    "raised-watchdog": Seeded(
+        "the watchdog's time may be raised above what the board was built with",
+        Edit(
+            "dcmp_parameters.c",
+            "DCMP_WATCHDOG_MIN_MS, config->watchdog_ms);",
+            "DCMP_WATCHDOG_MIN_MS, DCMP_WATCHDOG_MAX_MS);",
+        ),
+        100_000,
+    ),
     "one-byte-too-many": Seeded(
         "a COBS frame without an end is written a byte past its buffer",
         Edit("dcmp_cobs.c", "cobs->length == sizeof cobs->bytes", "cobs->length > sizeof cobs->bytes"),

@@ -120,10 +120,12 @@ def ranges(client: Client) -> Iterator[str]:
         if built < _LARGEST:
             yield from _tried(client, session, parameter, built + 1, Result.OUT_OF_RANGE)
             yield from _tried(client, session, parameter, _LARGEST, Result.OUT_OF_RANGE)
+    built = client.value(Parameter.WATCHDOG_MS)
     for value, expected in (
         (5, Result.OK),
         (4, Result.OUT_OF_RANGE),
-        (50, Result.OK),
+        (built, Result.OK),
+        (built + 1, Result.OUT_OF_RANGE),
         (51, Result.OUT_OF_RANGE),
         (-5, Result.OUT_OF_RANGE),
     ):

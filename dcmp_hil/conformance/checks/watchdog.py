@@ -57,8 +57,8 @@ def watchdog(client: Client) -> Iterator[str]:
     built = client.value(Parameter.WATCHDOG_MS)
     for what, set_ms, ttl_ms in (
         (f"WATCHDOG_MS {built}", 0, 50),
-        ("WATCHDOG_MS 10", 10, 50),
-        ("WATCHDOG_MS 50, ttl_ms 7", 50, 7),
+        (f"WATCHDOG_MS {min(10, built)}", min(10, built), 50),
+        (f"WATCHDOG_MS {built}, ttl_ms {min(7, built)}", 0, min(7, built)),
     ):
         session = client.own()
         if set_ms:

@@ -25,7 +25,7 @@ BUILT = {
 RANGES = {
     7: (1, 10000),
     8: (1, TOP),
-    9: (5, 50),
+    9: (5, 20),
     10: (1, 40000),
     11: (1, 20000),
     12: (0, 1),
@@ -71,6 +71,23 @@ def test_a_slew_that_the_board_was_built_with_can_be_lowered_only(core: Core) ->
     assert _set(bench, 8, 200) == (OK, 200)
 
 
+@pytest.mark.parametrize("built", [5, 6, 20, 49, 50])
+def test_the_watchdog_s_time_can_be_lowered_only(core: Core, built: int) -> None:
+    """Whatever is asked for, 0 V comes within what the board was built with and a tick."""
+    bench = Bench(core, watchdog_ms=built)
+    bench.hello()
+    for asked in (built + 1, 50, 51, TOP):
+        assert asked <= built or _set(bench, 9, asked) == (OUT_OF_RANGE, built)
+    assert _set(bench, 9, 5) == (OK, 5)
+    assert _set(bench, 9, built) == (OK, built)
+    bench.arm()
+    bench.drive(1000, ttl_ms=50)
+    bench.tick(built)
+    assert bench.state == 3
+    bench.tick(2)
+    assert bench.state == 4
+
+
 def test_a_board_without_edge_stamps(core: Core) -> None:
     bench = Bench(core, edge_stamps=False)
     bench.hello()
@@ -80,10 +97,10 @@ def test_a_board_without_edge_stamps(core: Core) -> None:
 
 def test_who_may_and_when(core: Core) -> None:
     bench = Bench(core)
-    assert _set(bench, 9, 30, session=0) == (NOT_OWNER, 20)
-    assert _set(bench, 9, 30) == (NOT_OWNER, 20)
+    assert _set(bench, 9, 15, session=0) == (NOT_OWNER, 20)
+    assert _set(bench, 9, 15) == (NOT_OWNER, 20)
     bench.hello()
-    assert _set(bench, 9, 30, session=9) == (NOT_OWNER, 20)
+    assert _set(bench, 9, 15, session=9) == (NOT_OWNER, 20)
     assert _set(bench, 0, 30) == (UNKNOWN, 0)
     assert _set(bench, 15, 30) == (READ_ONLY, 24000)
     assert _set(bench, 17, 30) == (UNKNOWN, 0)
@@ -92,7 +109,7 @@ def test_who_may_and_when(core: Core) -> None:
     for state in (2, 3, 4):
         bench = Bench(core)
         bench.go_to(state)
-        assert _set(bench, 9, 30) == (NOT_IDLE, 20)
+        assert _set(bench, 9, 15) == (NOT_IDLE, 20)
 
 
 def test_the_first_reason_is_answered(core: Core) -> None:
@@ -101,7 +118,7 @@ def test_the_first_reason_is_answered(core: Core) -> None:
     assert _set(bench, 200, 0, session=9) == (UNKNOWN, 0)
     assert _set(bench, 1, 0, session=9) == (READ_ONLY, 1)
     assert _set(bench, 9, 0, session=9) == (OUT_OF_RANGE, 20)
-    assert _set(bench, 9, 30, session=9) == (NOT_IDLE, 20)
+    assert _set(bench, 9, 15, session=9) == (NOT_IDLE, 20)
 
 
 @pytest.mark.parametrize("way", ["release", "lease"])
