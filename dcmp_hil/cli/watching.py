@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.cli import console
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.display import display_available, display_problem
+from dcmp_hil.telemetry.peers import others_here
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,6 +40,11 @@ def chosen(viewer: Viewer | None) -> Viewer:
 
 def watched(sink: RerunSink, viewer: Viewer) -> Sink:
     """Tell where a run is served, and serve pages as long as it lasts."""
+    if sink.port is not None and others_here():
+        console.note(
+            f"every user of this computer can connect to the dashboard on port {sink.port}, read it, and "
+            "show things in it; it is served no more where one does. The run's files take nothing from it."
+        )
     if sink.port is None or viewer not in {"serve", "web"}:
         return sink
     if viewer == "serve":

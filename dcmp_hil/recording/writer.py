@@ -13,6 +13,7 @@ from mcap.writer import CompressionType, Writer
 from dcmp_hil.clock import utc_now
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.backlog import Backlog
+from dcmp_hil.recording.chunk_indices import ChunkIndices
 from dcmp_hil.recording.layout import (
     ABOUT,
     CYCLE_SCHEMA,
@@ -109,6 +110,10 @@ class Recording:
             log = self._writer.register_schema("foxglove.Log", "jsonschema", EVENT_SCHEMA)
             self._cycles = self._writer.register_channel(CYCLES, "cdr", cycle)
             self._events = self._writer.register_channel(EVENTS, "json", log)
+            # Its list of objects would take a megabyte a minute for as long as the run goes on.
+            self._writer._Writer__chunk_indices = ChunkIndices(  # type: ignore[attr-defined]  # noqa: SLF001
+                (self._cycles, self._events)
+            )
             self._file.cut(0.0, 0.0, 1, 0)
             began, reason = self._file.put(), self._file.refused
         except OSError as error:

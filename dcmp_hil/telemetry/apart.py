@@ -74,6 +74,8 @@ class Apart:
         A function, pickled, that the process calls where this one has ended by force; see `Session`.
     mailbox
         Descriptor of the memory in which the run says how it ended.
+    speed
+        How many times faster than real time the rows come: a soak has hours of them in minutes.
 
     Attributes
     ----------
@@ -99,6 +101,7 @@ class Apart:
         model: Model = UNKNOWN_MODEL,
         unattended: bytes = b"",
         mailbox: int | None = None,
+        speed: float = 1.0,
     ) -> None:
         self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
         ring, ledger, self._setup, *kept = self._files
@@ -117,7 +120,7 @@ class Apart:
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
         setup = Setup(
-            _CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model, unattended, mailbox
+            _CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model, unattended, mailbox, speed
         )
         self._model = model
         os.write(self._setup, pickle.dumps(setup))
@@ -147,6 +150,12 @@ class Apart:
             raise ConfigError(*pickle.loads(answer))  # noqa: S301 - written by our own child
         if not stopped():
             self._go_without("did not come up")
+
+    @property
+    def behind(self) -> int:
+        """Rows that the slowest sink has not taken, as the process last said; 0 before it says so."""
+        state: State | None = self._ledger.read()
+        return self.ring.written - min(state.position, state.slowest) if state else 0
 
     def event(self, event: Event) -> None:
         """Send an event, or keep it until there is room; never blocks."""
@@ -198,6 +207,7 @@ class Apart:
                     pass_fds=[theirs.fileno(), terminal, *self._shared],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                    env={"MALLOC_ARENA_MAX": "2", **os.environ},  # a heap a thread would be a third more
                 )
             except OSError:
                 ours.close()

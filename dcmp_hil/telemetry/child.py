@@ -24,6 +24,7 @@ from dcmp_hil.telemetry.answers import MESSAGE
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
 from dcmp_hil.telemetry.died import how_it_died
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.heap import trim
 from dcmp_hil.telemetry.outlet import THREAD
 from dcmp_hil.telemetry.ring import Ring, size_of
 from dcmp_hil.telemetry.shared import Ledger, mapped
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 UP, FIGURES, DONE = b"up", b"figures", b"done"
 _IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
 _CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
+_TRIM_EVERY = 100  # looks into the ring: 10 s
 _ORPHANED = 1.0  # s for those that are late where the parent is gone: there is nobody to look at a window
 
 
@@ -60,6 +62,8 @@ class Setup:
         A function, pickled, that is called where the run's process has ended by force; nothing for none.
     mailbox
         Descriptor of the memory in which the run says how it ended; None if it does not.
+    speed
+        How many times faster than real time the rows come.
     """
 
     capacity: int
@@ -71,6 +75,7 @@ class Setup:
     model: Model
     unattended: bytes = b""
     mailbox: int | None = None
+    speed: float = 1.0
 
 
 class State(NamedTuple):
@@ -82,6 +87,7 @@ class State(NamedTuple):
     statistics: Statistics
     kept: Lengths
     troubles: list[str]
+    slowest: int = 0  # position of the sink that is furthest behind
 
 
 def main(connection: int, setup: int, terminal: int) -> None:
@@ -118,6 +124,7 @@ class _Watcher:
         self._ledger = Ledger(setup.ledger)
         self._services: list[Service] = []
         self._taken = 0  # events from the parent
+        self._looks = 0
 
     def serve(self) -> None:
         """Make the sinks, say so, and hand on until the end."""
@@ -132,7 +139,7 @@ class _Watcher:
         with select.epoll() as waiting:
             waiting.register(self._channel, select.EPOLLIN)
             while True:
-                waiting.poll(INTERVAL)
+                waiting.poll(INTERVAL / self._setup.speed)
                 ended = self._take_events() or os.getppid() != self._parent
                 self._hand_on()
                 if ended:
@@ -162,7 +169,8 @@ class _Watcher:
             warnings += getattr(sink, "warnings", ())
             ring = Ring(self._ring.capacity, self._ring.memory)
             audience = Audience(ring, [sink], self._tell, self._setup.model)
-            self._services.append(Service(audience, getattr(sink, "interval", INTERVAL)))
+            interval = getattr(sink, "interval", INTERVAL) / self._setup.speed
+            self._services.append(Service(audience, interval))
         return warnings
 
     def _tell(self, event: Event) -> None:
@@ -185,10 +193,21 @@ class _Watcher:
 
     def _hand_on(self) -> None:
         self._audience.hand_on()
+        self._looks += 1
+        if self._looks % _TRIM_EVERY == 0:
+            trim()
         lengths = self._keeper.lengths if self._keeper else Lengths()
         figures, ring = self._figures, self._ring
         self._ledger.write(
-            State(ring.position, ring.dropped, self._taken, figures.statistics, lengths, figures.troubles)
+            State(
+                ring.position,
+                ring.dropped,
+                self._taken,
+                figures.statistics,
+                lengths,
+                figures.troubles,
+                min((service.audience.ring.position for service in self._services), default=ring.position),
+            )
         )
 
     def _close(self) -> None:

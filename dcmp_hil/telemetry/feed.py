@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -38,12 +39,15 @@ class Feed:
         What is shown of it.
     span
         s of a run that are sent at once; 0 sends each block as it comes.
+    again
+        s after which what is sent once is sent again: a server forgets what is old.
     """
 
-    def __init__(self, outlet: Outlet, rig: RigView, span: float = 0.0) -> None:
+    def __init__(self, outlet: Outlet, rig: RigView, span: float = 0.0, again: float = math.inf) -> None:
         self.outlet = outlet
         self._frames = Frames(rig)
         self._span, self._period = span, rig.period
+        self._again = self._due = again
         self._waiting: list[Block] = []
 
     def block(self, block: Block) -> bool:
@@ -79,7 +83,12 @@ class Feed:
         if not self._frames.plots:
             self._frames.choose_lines(block)
             styles = self._frames.plots
-        return self.outlet.do(partial(_send_block, styles, self._frames.of_block(block)))
+        calls = self._frames.of_block(block)
+        t = float(block["t"][-1])
+        if t >= self._due:
+            self._due = t + self._again
+            calls += self._frames.of_once(t)
+        return self.outlet.do(partial(_send_block, styles, calls))
 
 
 def send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:

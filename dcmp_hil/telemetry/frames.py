@@ -55,6 +55,7 @@ class Frames:
             for field, (_, low, high, _) in HISTOGRAMS.items()
         }
         self._lanes = {name: Lane() for name in ("voltage", "samples")}
+        self._shown: dict[str, str] = {}  # lane to the newest state
         self._last_slot = -1
         self._portrait = Portrait()
         self._parameters = Parameters(rig.parameters, rig.kinds, rig.numbers)
@@ -89,6 +90,13 @@ class Frames:
             return [(LINK, self._times(t), rr.Scalars.columns(scalars=counts))]
         told = rr.TextLog.columns(text=[event.text], level=[event.level])
         return [("events/log", self._times(t), told), *self._changed(event)]
+
+    def of_once(self, t: float) -> list[Call]:
+        """Return at `t` what was sent once, or when it changed: the table of parameters, states, axes."""
+        at = np.array([t])
+        states = [self._state(lane, at, [state]) for lane, state in self._shown.items()]
+        axes = [(entity, self._times(at), columns) for entity, columns in self._portrait.axes()]
+        return [*self._table(t, {}), *states, *axes]
 
     def of_start(self) -> list[Call]:
         """Return the calls for what the run is tuned by as it begins."""
@@ -155,6 +163,7 @@ class Frames:
                 yield self._state(lane, block["t"][rows], [names[int(truth[row])] for row in rows])
 
     def _state(self, lane: str, t: NDArray[np.float64], states: list[str]) -> Call:
+        self._shown[lane] = states[-1]
         return lane_path(lane), self._times(t), rr.StateChange.columns(state=states)
 
     def _bars(self, field: str, t: NDArray[np.float64]) -> Call:

@@ -92,6 +92,10 @@ class Portrait:
             ]
         return t, calls
 
+    def axes(self) -> list[Call]:
+        """Return the axes as they were last drawn; nothing before that."""
+        return _axes(*self._reach) if self._reach[0] else []
+
     def _find_reach(self) -> tuple[float, float]:
         """Return the ends of the axes, rad and rad/s: never smaller than before, so that nothing jitters."""
         most = np.abs(self.points[:, 1:]).max(axis=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import math
 import os
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -18,7 +17,9 @@ from dcmp_hil.telemetry.beginning import begin, warm_up
 from dcmp_hil.telemetry.display import display_problem
 from dcmp_hil.telemetry.feed import Feed
 from dcmp_hil.telemetry.outlet import Outlet
+from dcmp_hil.telemetry.peers import strangers
 from dcmp_hil.telemetry.room import kept_for_data, room_for, short_of
+from dcmp_hil.telemetry.troubles import NO_ROOM, NO_WINDOW, STRANGERS, incomplete, spared, stuck
 
 if TYPE_CHECKING:
     import subprocess
@@ -35,26 +36,11 @@ _SERVER_START = 60.0  # s, a far limit: that it listens is an event, and nothing
 _CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
 _FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
+_HISTORY = "64MiB"  # of what late viewers get: two minutes at 1 kHz; what is sent once comes again
+_AGAIN = 10.0  # s
 _FILE_SPAN = 1.0  # s of a run that go into a file at once
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
-_STUCK = (
-    "The viewer has taken nothing for seconds and is left behind; the run goes on. "
-    "Close that viewer and open another."
-)
-_SCARCE = 100e6  # bytes free below which a disk is the likely cause
 _BEGINNING = 400e3  # bytes: scenery and layout are 250 kB
-_NO_ROOM = (
-    "{file}: there is room for {room:.0f} kB, and a recording begins with up to {beginning:.0f} kB. Free "
-    "some space, or record elsewhere (--record FILE.rrd) or not at all (--no-record)."
-)
-_SPARED = (
-    "{file} {what}: less than {needed:.3g} MB are free on its disk, and the data in run.mcap come first. "
-    "The run goes on. Free some space; `dcmp-hil export FOLDER --rrd FILE` makes the dashboard afterwards."
-)
-_NO_WINDOW = (
-    "The viewer ended by itself (exit code {code}; process.log in the run's folder has its words). "
-    "The run is served on port {port}: dcmp-hil view --port {port} --web"
-)
 
 
 class RerunSink:
@@ -78,6 +64,8 @@ class RerunSink:
         First port tried for the recording's own server, on 127.0.0.1 only (``spawn``, ``serve``, ``web``).
     spare
         Whether the file ends, with a warning, while its disk still has room for the data of the run.
+    history
+        What late viewers get at most, such as ``64MiB``.
 
     Attributes
     ----------
@@ -102,6 +90,7 @@ class RerunSink:
         port: int = window.PORT,
         *,
         spare: bool = False,
+        history: str = _HISTORY,
     ) -> None:
         self.warnings: list[str] = []
         self.port: int | None = None
@@ -110,6 +99,7 @@ class RerunSink:
         self._feeds: list[Feed] = []
         self._needed = kept_for_data(record) if record is not None and spare else 0.0
         self._application, self._recording = application, str(uuid4())
+        self._history = history
         rr.unregister_shutdown()
         if record is not None:
             self._open_file(record)
@@ -126,11 +116,12 @@ class RerunSink:
         if not len(block):
             return
         self._spare()
+        self._keep_to_ourselves()
         self._tell(lambda feed: feed.block(block))
         if self._window and (code := self._window.poll()) is not None:
             self._window = None
             if code:  # closed by the user it is 0
-                self.warnings.append(_NO_WINDOW.format(code=code, port=self.port))
+                self.warnings.append(NO_WINDOW.format(code=code, port=self.port))
 
     def event(self, event: Event) -> None:
         """Take an event."""
@@ -147,17 +138,17 @@ class RerunSink:
             try:
                 feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
-                faults.append(_incomplete(feed.outlet, str(error)))
+                faults.append(incomplete(feed.outlet, str(error)))
         if faults:
             raise RuntimeError(faults[0])
 
     def _tell(self, give: Callable[[Feed], bool]) -> None:
         for feed in tuple(self._feeds):
             try:
-                sentence = "" if give(feed) else _stuck(feed.outlet)
+                sentence = "" if give(feed) else stuck(feed.outlet)
             except Exception as error:  # noqa: BLE001 - one outlet that fails is no reason to lose the other
                 feed.outlet.leave()
-                sentence = f"{_incomplete(feed.outlet, str(error))} The run goes on."
+                sentence = f"{incomplete(feed.outlet, str(error))} The run goes on."
             if sentence:
                 self._feeds.remove(feed)
                 self.warnings.append(sentence)
@@ -169,7 +160,18 @@ class RerunSink:
             if file is not None and self._needed and short_of(file, self._needed):
                 feed.outlet.leave()
                 self._feeds.remove(feed)
-                self.warnings.append(_spared(file, "ends here", self._needed))
+                self.warnings.append(spared(file, "ends here", self._needed))
+
+    def _keep_to_ourselves(self) -> None:
+        """End the server where another user is connected to it: who they are is asked nobody by Rerun."""
+        if self.port is None or not (users := strangers(self.port)):
+            return
+        self.warnings.append(STRANGERS.format(user=users[0], port=self.port))
+        self.port = None
+        for feed in [one for one in self._feeds if one.outlet.file is None]:
+            feed.outlet.farewell = lambda: None
+            feed.outlet.leave()
+            self._feeds.remove(feed)
 
     def _stream(self) -> rr.RecordingStream:
         return rr.RecordingStream(self._application, recording_id=self._recording)
@@ -184,11 +186,11 @@ class RerunSink:
             ) from None
         if self._needed and short_of(record, self._needed + _BEGINNING):
             record.unlink(missing_ok=True)
-            self.warnings.append(_spared(record, "is not written", self._needed))
+            self.warnings.append(spared(record, "is not written", self._needed))
             return
         room = room_for(record)
         if room < _BEGINNING:  # Rerun waits for ever where the disk fills up while it begins
-            raise ConfigError(_NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _BEGINNING))
+            raise ConfigError(NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _BEGINNING))
         outlet = Outlet(self._stream(), _FILE_PATIENCE, _CLOSING, file=record)
         outlet.do(partial(warm_up, self._rig))
         # A footer would take memory for every chunk for as long as the run goes on: 25 MB a minute.
@@ -207,7 +209,7 @@ class RerunSink:
         outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
         outlet.do(partial(warm_up, self._rig))
         outlet.do(partial(begin, target, self._rig))
-        self._feeds.append(Feed(outlet, self._rig))
+        self._feeds.append(Feed(outlet, self._rig, again=_AGAIN))
         return outlet
 
     def _connect(self) -> None:
@@ -233,7 +235,7 @@ class RerunSink:
     def _serve(self, first_port: int) -> Outlet | None:
         """Let viewers come and go; who comes late gets what there was."""
         for port in window.free_ports(first_port):
-            target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit="256MiB")
+            target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
             outlet = self._open_viewer(target, _CLOSING)
             if window.serves(port, os.getpid(), _SERVER_START):
                 self.port = port
@@ -257,26 +259,3 @@ class RerunSink:
             return
         outlet.farewell = partial(window.let_viewer_catch_up, process, port)
         self._window = process
-
-
-def _stuck(outlet: Outlet) -> str:
-    if outlet.file is None:
-        return _STUCK
-    return f"{_incomplete(outlet, f'it did not grow for {outlet.stalled:.0f} s')} The run goes on."
-
-
-def _incomplete(outlet: Outlet, reason: str) -> str:
-    """Say that a recording, or what a viewer got, is incomplete, with what was measured."""
-    if outlet.file is None:
-        return f"What the viewer shows is incomplete: {reason}."
-    measured = f"{1e-6 * outlet.size():.1f} MB are in it"
-    remedy = ""
-    room = room_for(outlet.file)
-    if math.isfinite(room):
-        measured += f", there is room for {1e-9 * room:.1f} GB more"
-        remedy = " Free some space." if room < _SCARCE else ""
-    return f"The recording is incomplete: {reason.rstrip('.')} ({measured}).{remedy}"
-
-
-def _spared(file: Path, what: str, needed: float) -> str:
-    return _SPARED.format(file=file, what=what, needed=1e-6 * needed)

@@ -1,0 +1,35 @@
+"""Other users of this computer at a port that serves a dashboard: Rerun's server asks nobody who they are."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+_TABLE = Path("/proc/net/tcp")
+_CONNECTED = {"01", "04", "05", "08"}  # established, and on the way out with what was read
+_PEOPLE = range(1000, 60_000)  # user numbers, as distributions give them
+_ROOT = 0  # may do as it likes, and reads this process's memory
+
+
+def strangers(port: int) -> list[int]:
+    """Return the users, this one and root left out, who are connected to a port of 127.0.0.1."""
+    here = f"0100007F:{port:04X}"
+    try:
+        rows = [line.split() for line in _TABLE.read_text("ascii").splitlines()[1:]]
+    except OSError:  # not Linux: nobody can tell
+        return []
+    users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED}
+    return sorted(users - {os.getuid(), _ROOT})
+
+
+def others_here() -> bool:
+    """Return whether another person has a process on this computer."""
+    with suppress(OSError):
+        for place in Path("/proc").iterdir():
+            if place.name.isdigit():
+                with suppress(OSError):
+                    user = place.stat().st_uid
+                    if user in _PEOPLE and user != os.getuid():
+                        return True
+    return False
