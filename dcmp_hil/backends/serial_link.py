@@ -16,6 +16,7 @@ from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.failures import cannot_open, reason
 from dcmp_hil.config.backends import Serial as SerialSettings
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
+from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.carriers import has_samples
 
@@ -173,6 +174,21 @@ class SerialLink:
         )
 
 
+class Port(serial.Serial):
+    """A serial port that a process which is forked does not hold: it would keep the lock after our end."""
+
+    def open(self) -> None:
+        """Open it."""
+        super().open()
+        keep_from_forks(self.fileno())
+
+    def close(self) -> None:
+        """Close it; again is nothing."""
+        if self.is_open:
+            forget(self.fileno())
+        super().close()
+
+
 def open_port(path: str, baud: int) -> serial.Serial:
     """Open a serial port for this process alone; reads and writes never block.
 
@@ -182,7 +198,7 @@ def open_port(path: str, baud: int) -> serial.Serial:
         If there is none, it is busy, it may not be opened, or it cannot do this baud rate.
     """
     try:
-        port = serial.Serial(path, baud, timeout=0, write_timeout=0, exclusive=True)
+        port = Port(path, baud, timeout=0, write_timeout=0, exclusive=True)
     except (ValueError, OverflowError) as error:
         raise OpenError(f"{path}: cannot do {baud} baud ({error}). Choose another backend.baud.") from error
     except FAILURES as error:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from dcmp_hil.backends.serial_link import open_port
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.endings import Interrupted, StopRequest
 from dcmp_hil.forked import forget, keep_from_forks
@@ -324,6 +325,26 @@ def test_fork_has_neither_handlers_nor_lines_of_the_run(tmp_path: Path) -> None:
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
     assert (tmp_path / "handler").read_text() == "False"
+
+
+def test_fork_does_not_keep_the_lock_of_a_port(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    path = os.ttyname(theirs)
+    port = open_port(path, 1_000_000)
+    pid = os.fork()
+    if pid == 0:  # pragma: no cover - another process
+        (tmp_path / "forked").touch()
+        time.sleep(BOUND)
+        os._exit(0)
+    try:
+        until((tmp_path / "forked").exists, "it forked")
+        port.close()
+        open_port(path, 1_000_000).close()
+    finally:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        os.close(ours)
+        os.close(theirs)
 
 
 @pytest.mark.parametrize("at", ["dcmp_hil.cli.check", "dcmp_hil.errors", "typer"])

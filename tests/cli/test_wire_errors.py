@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 import serial
 
+from dcmp_hil.backends import serial_link
 from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump
 from tests.helpers import bench
@@ -65,7 +66,7 @@ def test_no_permission(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> int:
         raise serial.SerialException(13, "could not open port: Permission denied")  # as pyserial says it
 
-    monkeypatch.setattr(serial, "Serial", refuse)  # root may open everything
+    monkeypatch.setattr(serial_link, "Port", refuse)  # root may open everything
     outcome = start(cli, "/dev/ttyS0")
     assert outcome.code == 3
     assert "dialout" in only_line(outcome)
