@@ -55,6 +55,7 @@ SLOPE_MB, TOTAL_MB = 0.2, 500.0
 """What a process may grow by in a simulated minute after that, and what all may take."""
 _PORT = 30_000
 _FAR = 8_000  # rows: a quarter of the ring
+_LOOK_S = 5.0  # s of data between two looks at memory
 _BATCH_S = 0.1  # s of data that are written at once
 
 
@@ -73,9 +74,15 @@ class Memory:
                     self.minutes.append(minute)
                     self.pss_mb.append(1e-3 * float(line.split()[1]))
 
+    def floor(self) -> list[float]:
+        """Return the least of each minute: what waits in queues comes and goes, a leak stays."""
+        whole = np.floor(self.minutes)
+        return [float(np.array(self.pss_mb)[whole == minute].min()) for minute in np.unique(whole)]
+
     def slope(self) -> float:
-        """Return the median slope of all pairs after the first minutes (Theil and Sen), MB a minute."""
-        x, y = np.array(self.minutes), np.array(self.pss_mb)
+        """Return the median slope of all pairs of minutes after the first ones (Theil, Sen), MB a minute."""
+        y = np.array(self.floor())
+        x = np.unique(np.floor(self.minutes))
         x, y = x[x >= SETTLING], y[x >= SETTLING]
         first, second = np.triu_indices(len(x), 1)
         if not len(first):
@@ -222,7 +229,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str) -> Soaked:
             t = source.write(round(_BATCH_S / rig.period))
             for event in events(batch, t):
                 apart.event(event)
-            if batch % round(60.0 / _BATCH_S) == 0:
+            if batch % round(_LOOK_S / _BATCH_S) == 0:
                 for name, pid in pids.items():
                     memory[name].look(t / 60.0, pid)
                 peak = max(peak, sum(one.pss_mb[-1] for one in memory.values()))
@@ -236,7 +243,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str) -> Soaked:
     return Soaked(
         minutes, wall, cpu,
         {name: one.slope() for name, one in memory.items()},
-        {name: [round(mb) for mb in one.pss_mb] for name, one in memory.items()},
+        {name: [round(mb) for mb in one.floor()] for name, one in memory.items()},
         peak, apart.dropped, recorded, source.written,
         _mb(folder / "run.mcap") / minutes, _mb(folder / "run.rrd") / minutes, troubles,
     )  # fmt: skip
@@ -271,7 +278,7 @@ def real(minutes: float, folder: Path) -> Soaked:
     return Soaked(
         minutes, time.monotonic() - began, cpu,
         {name: one.slope() for name, one in memory.items()},
-        {name: [round(mb) for mb in one.pss_mb] for name, one in memory.items()},
+        {name: [round(mb) for mb in one.floor()] for name, one in memory.items()},
         peak, figures["dropped_periods"], _periods_in(kept / "run.mcap"), figures["periods"],
         _mb(kept / "run.mcap") / minutes, _mb(kept / "run.rrd") / minutes, troubles,
     )  # fmt: skip

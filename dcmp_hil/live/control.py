@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.endings import SIGNALS, TAKEN
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.live.crowd import BETWEEN, PATIENCE, Crowd, listen
 from dcmp_hil.live.knobs import knobs
 from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.live.places import peer_of, socket_of
@@ -91,6 +92,7 @@ class Server:
         self._stopping: asyncio.Task[Stopped] | None = None
         self._unanswered = 0  # who asked for STOP and has no answer yet
         self._watchers: set[asyncio.StreamWriter] = set()
+        self._crowd = Crowd()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one connection."""
@@ -98,16 +100,19 @@ class Server:
         try:
             if peer_of(connection)[1] != os.getuid():
                 return
-            while line := await reader.readline():
+            self._crowd.admit(writer)
+            while line := await asyncio.wait_for(reader.readline(), PATIENCE):
                 await self._answer(json.loads(line), writer)
+                await asyncio.sleep(BETWEEN)
         except (
-            OSError,
+            OSError,  # a TimeoutError is one
             ValueError,
             RecursionError,
             asyncio.CancelledError,
         ):  # gone, no line of JSON, or the run's end, which CPython 3.11 would print as an error
             pass
         finally:
+            self._crowd.forget(writer)
             self._watchers.discard(writer)
             writer.close()
 
@@ -117,6 +122,7 @@ class Server:
             self._watchers.add(writer)
             await self._watch(writer)
         elif do == "stop":
+            self._crowd.forget(writer)  # it stays until it is answered
             await self._answer_stop(writer)
         elif do == "set":
             async with self._one_at_a_time:
@@ -263,7 +269,7 @@ async def _serve(line: socket.socket, server: Server, mailbox: Mailbox, path: Pa
         return
     _remove(path)  # of a process that had our number before
     before = os.umask(0o077)
-    listening = await asyncio.start_unix_server(server.serve, path, limit=_LONGEST)
+    listening = await listen(server.serve, path, _LONGEST)
     os.umask(before)
     try:
         await watch.until_end()

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from dcmp_hil.live.client import status
+from dcmp_hil.live.client import status, stop
+from dcmp_hil.live.places import socket_of
 from tests.live.processes import BOUND, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
 from tests.panel.test_browser import address_of, free_port
@@ -81,6 +82,7 @@ def _flooded(kind: str, target: str, times: int = 1) -> Iterator[None]:
     try:
         time.sleep(1.5)
         yield
+        assert [flood.poll() for flood in floods] == [None] * times  # to the end
     finally:
         for flood in floods:
             flood.kill()
@@ -116,6 +118,23 @@ def test_stop_gets_through_a_flood(
     panel.process.wait(BOUND)
     assert len("".join(panel.log)) < _LOG
     assert "Traceback" not in "".join(panel.log)
+
+
+@pytest.mark.parametrize("kind", ["half_open", "lines"])
+def test_stop_gets_through_a_flood_of_the_control_socket(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, figure: Callable[[str], None]
+) -> None:
+    with own_folder(monkeypatch), started(tmp_path, *_RUN, "--json", "figures.json") as run:
+        until_running(run)
+        with _flooded(kind, str(socket_of(run.pid))):
+            began = time.monotonic()
+            stop(run.pid)
+            waited = time.monotonic() - began
+            assert run.wait(BOUND) == 0
+    figure(f"A9: STOP through {kind} at the control socket: {1e3 * waited:.0f} ms")
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["ended_by"] == "STOP"
+    assert figures["dropped_periods"] == 0
 
 
 def test_a_stop_that_waited_is_dropped_and_the_page_says_so(panel: _Panel, tmp_path: Path) -> None:

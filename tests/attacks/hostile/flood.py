@@ -35,15 +35,22 @@ def half_open(target: str) -> None:
                     held[-1].sendall(b"POST /stop HT")
         except OSError:
             pass
-        readable, _, _ = select.select(held, [], [], 0.01) if held else ([], [], [])
-        for one in readable:
-            try:
-                gone = not one.recv(4096)
-            except OSError:
-                gone = True
-            if gone:
-                held.remove(one)
-                one.close()
+        _drop_the_closed(held)
+
+
+def _drop_the_closed(held: list[socket.socket]) -> None:
+    told = select.poll()
+    for one in held:
+        told.register(one, select.POLLIN)
+    speak = {number for number, _ in told.poll(10)}
+    for one in [one for one in held if one.fileno() in speak]:
+        try:
+            gone = not one.recv(4096)
+        except OSError:
+            gone = True
+        if gone:
+            held.remove(one)
+            one.close()
 
 
 def requests(target: str) -> None:
