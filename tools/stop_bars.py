@@ -334,7 +334,12 @@ def main() -> int:
     kinds = asked.kind or (REQUIRED if asked.required else KINDS)
     jobs = [(kind, ways[k % len(ways)]) for kind in kinds for k in range(asked.n)]
     with ThreadPoolExecutor(asked.jobs) as pool:
-        bars = list(pool.map(lambda job: attack(*job), jobs))
+        bars = []
+        for bar in pool.map(lambda job: attack(*job), jobs):
+            bars.append(bar)
+            sys.stderr.write(
+                f"{len(bars)}/{len(jobs)} {bar.kind}, {bar.way}: {'; '.join(bar.wrong) or 'well'}\n"
+            )
     said = table(bars) + "\n"
     wrong = [f"{bar.kind}, {bar.way}: {'; '.join(bar.wrong)}\n" for bar in bars if bar.wrong]
     sys.stdout.write(said + "".join(wrong))
