@@ -135,7 +135,7 @@ class SupervisorSection(Section):
     probe: Literal["first", "off"] = "first"
     """`first`: before engaging, +-1 V for 0.1 s each show which way the arm goes; `off`: trust the signs."""
     monitors: Literal["all", "finite"] = "all"
-    """`finite`: watch for NaN and device faults only (simulation only)."""
+    """`finite`: watch for NaN and device faults only, not for speed or chatter (simulation only)."""
     velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0
     """Trip above this velocity, rad/s; kept by host and device. The reference is held 5 % short of it."""
     position_limit_rad: Annotated[float, Field(ge=0.01, le=10_000)] = 6.2832
