@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 #define CHUNK 64u /* bytes at a time */
+#define LATE_MAX 255u
 
 /* What the log has of earlier boots can be asked for over the wire. */
 static struct dcmp_config with_last_fault(const struct dcmp_config *config, const struct fault_log *log)
@@ -65,11 +66,26 @@ static void say_failure(struct app *app, uint32_t now_us)
     }
 }
 
-struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
+uint32_t app_missed(uint32_t between_us, uint32_t period_us)
 {
+    const uint32_t periods = between_us / period_us + (between_us % period_us > period_us / 2u ? 1u : 0u);
+    return periods > 1u ? periods - 1u : 0u;
+}
+
+/* Those that were missed count as well, up to where the counter stops. */
+static void count_late(struct app *app, const struct app_tick *tick)
+{
+    for (uint32_t i = 0; i < tick->missed && i < LATE_MAX; i++) {
+        dcmp_device_late_tick(&app->device);
+    }
     if (tick->late) {
         dcmp_device_late_tick(&app->device);
     }
+}
+
+struct dcmp_output app_tick(struct app *app, const struct app_tick *tick)
+{
+    count_late(app, tick);
     if (app->lost) {
         app->lost = false;
         dcmp_device_overrun(&app->device);

@@ -48,11 +48,15 @@ struct app_tick {
     uint32_t now_us;
     uint32_t counts;
     struct dcmp_edge edge;
-    bool late; /* it was served too late */
+    bool late;       /* it was served too late */
+    uint32_t missed; /* periods before it that had no tick at all */
 };
 
 void app_start(struct app *app, const struct dcmp_config *config, enum dcmp_carrier carrier, struct fault_log *log,
                int32_t failure, uint32_t now_us);
+
+/* How many periods had no tick, by a clock that runs freely between the edges of two ticks. */
+uint32_t app_missed(uint32_t between_us, uint32_t period_us);
 
 /* One period. */
 struct dcmp_output app_tick(struct app *app, const struct app_tick *tick);

@@ -27,6 +27,7 @@ struct board {
     struct app app;
     struct clock clock;
     struct settings settings;
+    uint32_t rang_us; /* when the sample clock rang for the tick before */
 };
 
 static struct board board;
@@ -141,12 +142,16 @@ void board_tick(void)
 {
     const uint32_t late_us = timebase_take_tick();
     const uint32_t now_us = timebase_us();
+    const uint32_t rang_us = now_us - late_us;
+    const uint32_t period_us = (uint32_t)board.settings.config.period_us;
     const struct app_tick tick = {
         .now_us = now_us,
         .counts = quadrature_latched(),
-        .edge = quadrature_edge(now_us - late_us),
-        .late = late_us > (uint32_t)board.settings.config.period_us / LATE_PART,
+        .edge = quadrature_edge(rang_us),
+        .late = late_us > period_us / LATE_PART,
+        .missed = app_missed(rang_us - board.rang_us, period_us),
     };
+    board.rang_us = rang_us;
     board.app.life.ticks++;
     if (on_can()) {
         renew_bus();
@@ -245,6 +250,7 @@ static void start(void)
               board.settings.link == RECORD_SLCAN ? DCMP_CARRIER_SLCAN : DCMP_CARRIER_COBS, &fault_log,
               board.settings.failure, timebase_us());
     watchdog_start();
+    board.rang_us = timebase_us();
     let_interrupts_come();
     timebase_start_ticks(board.clock.apb1_timers_Hz, (uint32_t)board.settings.config.period_us);
 }

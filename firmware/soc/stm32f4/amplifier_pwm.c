@@ -8,6 +8,7 @@
 #define PWM_PIN 8u
 #define DIRECTION_PIN 14u
 #define BREAK_PIN 12u
+#define LOCK_MOST 3u /* break, idle states, polarities, modes: until the next reset no program changes them, MOE alone */
 
 static void write_duty(int32_t part, int32_t whole)
 {
@@ -37,7 +38,8 @@ void amplifier_start(const struct clock *clock, const struct amplifier_scale *sc
     TIM1->ARR = clock->apb2_timers_Hz / FREQUENCY_HZ - 1u;
     TIM1->CCMR1 = (TIM_CCMR1_OC1M_PWM1 << TIM_CCMR1_OC1M_POS) | TIM_CCMR1_OC1PE;
     TIM1->CCER = TIM_CCER_CC1E;
-    TIM1->BDTR = TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE; /* no MOE: low until somebody arms */
+    /* Behind what it locks. No MOE: low until somebody arms. */
+    TIM1->BDTR = TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE | (LOCK_MOST << TIM_BDTR_LOCK_POS);
     TIM1->EGR = TIM_EGR_UG;
     TIM1->SR = 0;
     TIM1->CR1 = TIM_CR1_ARPE | TIM_CR1_CEN;

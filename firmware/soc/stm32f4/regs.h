@@ -137,6 +137,7 @@ struct timer {
 #define TIM_CCMR2_CC3S_POS 0u
 #define TIM_CCER_CC1E BIT(0)
 #define TIM_CCER_CC3E BIT(8)
+#define TIM_BDTR_LOCK_POS 8u
 #define TIM_BDTR_OSSI BIT(10)
 #define TIM_BDTR_OSSR BIT(11)
 #define TIM_BDTR_BKE BIT(12)

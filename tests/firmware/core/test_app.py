@@ -192,6 +192,26 @@ def test_broken_power_stage_stops_everything(core: Core) -> None:
     assert [entry[2] for entry in board.logged()] == ["BREAK_INPUT"]
 
 
+@pytest.mark.parametrize(
+    ("between_us", "period_us", "missed"),
+    [(0, 1000, 0), (999, 1000, 0), (1000, 1000, 0), (1500, 1000, 0), (1501, 1000, 1), (2000, 1000, 1),
+     (2499, 1000, 1), (2501, 1000, 2), (100, 100, 0), (25_600, 100, 255), (0xFFFF_FFFF, 100, 42_949_672)],
+)  # fmt: skip
+def test_periods_without_a_tick(core: Core, between_us: int, period_us: int, missed: int) -> None:
+    assert core.lib.app_missed(between_us, period_us) == missed
+
+
+@pytest.mark.parametrize(
+    ("missed", "late", "counted"), [(1, False, 1), (3, True, 4), (254, False, 254), (1 << 31, True, 255)]
+)
+def test_ticks_that_were_missed_are_counted(core: Core, missed: int, late: bool, counted: int) -> None:
+    board = Board(core)
+    board.tick(missed=missed, late=late)
+    board.tick(99)
+    health = [fields for name, fields in board.messages() if name == "HEALTH"]
+    assert health[-1]["late_ticks"] == counted
+
+
 def test_health_counts_what_the_board_saw(core: Core) -> None:
     board = Board(core)
     board.app.idle_percent = 87

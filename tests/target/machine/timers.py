@@ -191,12 +191,32 @@ class PwmTimer(Timer):
             self.system.cpu.line(self.BREAK_IRQ, lambda: bool(self.now["SR"] & self.now["DIER"] & 0x80))
             self.system.look_at_pins()
 
-    def write_BDTR(self, value: int, _: int) -> int:  # noqa: N802
-        """Enable outputs, unless the pin says no."""
-        self.now["BDTR"] = value
+    def _kept(self, register: str, value: int, before: int, bits: int) -> int:
+        """Return what a register holds, some bits of which are locked (RM0090, LOCK of TIM1_BDTR)."""
+        if (value ^ before) & bits:
+            self.misuse(f"{register}: locked bits in {value:#x}")
+        return value & ~bits | before & bits
+
+    def write_BDTR(self, value: int, before: int) -> int:  # noqa: N802
+        """Enable outputs, unless the pin says no; what is locked stays, LOCK itself first of all."""
+        lock = before >> 8 & 3
+        bits = (0x73FF if lock else 0) | (0x0C00 if lock >= 2 else 0)
+        self.now["BDTR"] = self._kept("BDTR", value, before, bits)
         self.look_at_break()
         self.system.look_at_pins()
         return self.now["BDTR"]
+
+    def write_CR2(self, value: int, before: int) -> int:  # noqa: N802
+        """Set the idle states, as long as nothing is locked."""
+        return self._kept("CR2", value, before, 0x7F00 if self.field("BDTR", 8, 2) else 0)
+
+    def write_CCER(self, value: int, before: int) -> int:  # noqa: N802
+        """Set the polarities, as long as they are not locked."""
+        return self._kept("CCER", value, before, 0x2AAA if self.field("BDTR", 8, 2) >= 2 else 0)
+
+    def write_CCMR1_Output(self, value: int, before: int) -> int:  # noqa: N802
+        """Set the modes of the channels, as long as they are not locked."""
+        return self._kept("CCMR1", value, before, 0x7878 if self.field("BDTR", 8, 2) == 3 else 0)
 
     def write_CCR1(self, value: int, _: int) -> int:  # noqa: N802
         """Change the duty cycle."""
