@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz mutants firmware bench soak soak-long encoders walk numbers chatter stop-bars lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders walk numbers chatter stop-bars lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -95,6 +95,9 @@ soak: $(DEV) ## an hour of `dcmp-hil run` by the wall clock, with everything on:
 
 soak-long: $(DEV) ## eight hours of data by rate through the real processes
 	@$(BIN)/python -m tools.soak --minutes 480 $(ARGS)
+
+limits: $(DEV) ## wrong observers of six kinds against speed limits, 1,000 healthy arms: the table of docs/safety.md
+	@$(BIN)/python -m tools.limits $(ARGS)
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)
