@@ -107,13 +107,12 @@ class Soaked:
     rrd_mb_a_minute: float
     troubles: list[str]
 
-    @property
-    def faults(self) -> list[str]:
-        """What must not be."""
+    def faults(self, slope_mb: float) -> list[str]:
+        """Return what must not be, such as a slope above `slope_mb` (MB a simulated minute)."""
         found = [
             f"{name} grows by {slope:.3f} MB a simulated minute"
             for name, slope in self.slope_mb_a_minute.items()
-            if not slope < SLOPE_MB
+            if not slope < slope_mb
         ]
         if self.peak_total_mb > TOTAL_MB:
             found.append(f"all of them take {self.peak_total_mb:.0f} MB")
@@ -353,6 +352,7 @@ def main() -> None:
     parser.add_argument(
         "--history", default="64MiB", help="that the dashboard's server keeps for late viewers"
     )
+    parser.add_argument("--slope", type=float, default=SLOPE_MB, help="MB a simulated minute, at most")
     parser.add_argument("--real", action="store_true", help="`dcmp-hil run`, by the wall clock")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
@@ -362,8 +362,8 @@ def main() -> None:
         else:
             soaked = soak(options.minutes, options.speed, folder, options.history)
     sys.stdout.write(json.dumps(asdict(soaked)) + "\n")
-    if soaked.faults:
-        sys.exit("; ".join(soaked.faults))
+    if faults := soaked.faults(options.slope):
+        sys.exit("; ".join(faults))
 
 
 if __name__ == "__main__":
