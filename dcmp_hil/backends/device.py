@@ -69,8 +69,7 @@ class DeviceBackend:
         self._fault: int = Fault.NONE
         self._left = 0  # the fault that ended RUN
         self._ttl_ms = terms.watchdog_ms
-        self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2
-        """Periods for which the device goes on with a command."""
+        self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2  # periods that a command holds
         self._bridge_ns = int(_MOST_LOST * 1e9 * rig.period)
         self._heard_ns = 0
         self._forgotten = False  # the device has given us up, and may be somebody else's
@@ -189,7 +188,7 @@ class DeviceBackend:
         self._meter.answered(self._clock.now_ns())
 
     def truth(self) -> Truth:
-        """Return NaN: nobody knows."""
+        """Return NaN: a device does not know."""
         return UNKNOWN_TRUTH
 
     def _give_up_after(self, gap_ns: int) -> NoReturn:
