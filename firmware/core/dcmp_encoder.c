@@ -138,7 +138,7 @@ void dcmp_encoder_tick(struct dcmp_encoder *encoder, uint32_t counts, int32_t bu
     } else {
         /* the next count says whether this one was wrong */
     }
-    encoder->raw_oldest = encoder->started ? encoder->raw_before : counts & DCMP_COUNT_MASK;
+    encoder->raw_oldest = encoder->raw_before; /* at the first count 0: never the middle one of two that are equal */
     encoder->raw_before = encoder->started ? encoder->raw : counts & DCMP_COUNT_MASK;
     encoder->raw = counts & DCMP_COUNT_MASK;
     encoder->started = true;
