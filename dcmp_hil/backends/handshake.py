@@ -141,9 +141,9 @@ class Handshake:
         return refusals.damaged(self._link.name, here, there, error)
 
     def _stop(self) -> None:
-        """Leave nothing armed."""
+        """Leave nothing armed; the end of a run that a person asked for here is cleared by the next start."""
         with contextlib.suppress(BackendError):
-            self._caller.say(Stop(StopReason.PERSON))
+            self._caller.say(Stop(StopReason.REQUESTED))
 
     def _give_back(self) -> None:
         """Release the session, so that whoever tries next need not wait until it lapses."""
