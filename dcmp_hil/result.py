@@ -33,6 +33,8 @@ class Result:
         columns were not kept.
     events
         What happened, in order.
+    periods
+        How many the whole run had.
     dropped
         Periods that telemetry lost because a sink was slow; they are in no figure.
     link
@@ -61,6 +63,7 @@ class Result:
     summary: Summary
     columns: dict[str, NDArray[np.float64]]
     events: tuple[Event, ...]
+    periods: int = 0
     dropped: int = 0
     link: LinkCounters | None = None
     link_concerns: tuple[Concern, ...] = ()

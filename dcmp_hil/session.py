@@ -256,6 +256,7 @@ class Session:
             summary=self._figures.statistics.summary(self._realtime_factor),
             columns=self._figures.columns(),
             events=self._figures.events(),
+            periods=self._recorder.written,
             dropped=self._apart.dropped if self._apart else self._recorder.dropped,
             link=getattr(self._line.backend, "counters", None),
             link_concerns=tuple(self._recorder.link.concerns.values()),

@@ -11,7 +11,7 @@ import typer
 from rich.text import Text
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.options import JsonFile
+from dcmp_hil.cli.options import Force, JsonFile
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.conformance.check import Verdict
 from dcmp_hil.errors import BackendError, ConfigError
@@ -84,6 +84,7 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     ] = False,
     list_them: Annotated[bool, typer.Option("--list", help="List the checks and end.")] = False,
     json_to: JsonFile = None,
+    force: Force = False,
 ) -> None:
     """Check that a device does what docs/protocol.md says, with messages of that page alone.
 
@@ -103,7 +104,7 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
         raise ConfigError(
             "PORT: missing. Name the port of the device, such as /dev/ttyACM0; `dcmp-hil ports` lists them."
         )
-    try_places({"--json": json_place(json_to)})
+    try_places({"--json": json_place(json_to)}, force=force)
     if arm and any(check.needs_arm for check in chosen):
         _confirm(yes=yes)
     said = console.err if json_to == "-" else console.out

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from dcmp_hil.cli.options import Force
+
 
 def export(
     file: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.mcap.")],
@@ -15,8 +17,9 @@ def export(
         Path | None, typer.Option(metavar="FILE", help="The same for pandas and others.")
     ] = None,
     rrd: Annotated[Path | None, typer.Option(metavar="FILE", help="The dashboard, for Rerun.")] = None,
+    force: Force = False,
 ) -> None:
-    """Write a run's recording as CSV, Parquet, or a Rerun recording."""
+    """Write a run's recording as CSV, Parquet, or a Rerun recording; nothing that it names is imported."""
     from dcmp_hil.cli.own_recording import write_exports
 
-    write_exports(file, csv=csv, parquet=parquet, rrd=rrd)
+    write_exports(file, csv=csv, parquet=parquet, rrd=rrd, force=force)

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 _REMEDY = "Choose a file you may write, in a folder that exists."
 
 
-def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | None = None) -> None:
+def try_places(
+    places: Mapping[str, Path | None], inputs: Mapping[str, Path] | None = None, *, force: bool = False
+) -> None:
     """Look whether files could be written, without making, changing or touching any.
 
     Parameters
@@ -24,7 +26,9 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
     places
         Option to file; None is nowhere.
     inputs
-        What is read, in words, to its file: nothing is written there.
+        What is read, in words, to its file: nothing is ever written there, whatever it is called.
+    force
+        Whether a file that is there may be overwritten.
 
     Raises
     ------
@@ -32,7 +36,7 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         With a sentence for each place that cannot be written, or that another one is already.
     """
     faults: list[str] = []
-    taken = {real(path): f"is {what} itself" for what, path in (inputs or {}).items()}
+    taken: dict[Path, str] = {}
     for option, path in places.items():
         if path is None:
             continue
@@ -40,13 +44,25 @@ def try_places(places: Mapping[str, Path | None], inputs: Mapping[str, Path] | N
         if reason:
             faults.append(f"{option} {path}: {reason}. {_REMEDY}")
             continue
-        place = real(path)
-        if place in taken:
-            faults.append(f"{option} {path}: {taken[place]}. Write elsewhere.")
+        reason = _refusal(path, inputs or {}, taken, force=force)
+        if reason:
+            faults.append(f"{option} {path}: {reason}")
         if not is_special(path):
-            taken[place] = f"is where {option} goes, too"
+            taken[real(path)] = option
     if faults:
         raise ConfigError(*faults)
+
+
+def _refusal(path: Path, inputs: Mapping[str, Path], taken: Mapping[Path, str], *, force: bool) -> str:
+    """Return why nothing may be written there though it could be; nothing if it may."""
+    for what, other in inputs.items():
+        if _same(path, other):
+            return f"is {what} itself. Write elsewhere."
+    if real(path) in taken:
+        return f"is where {taken[real(path)]} goes, too. Write elsewhere."
+    if not force and path.is_file():
+        return "is there already. Write elsewhere, or overwrite it with --force."
+    return ""
 
 
 def try_folder(option: str, folder: Path) -> None:
@@ -118,6 +134,22 @@ def _fault_of_folder(folder: Path) -> str:
     if not stat.S_ISDIR(mode):
         return f"{folder} is no folder"
     return "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} may not be written"
+
+
+def _same(path: Path, other: Path) -> bool:
+    """Return whether both are one file: by another spelling, a link of either kind, or in other letters."""
+    if real(path) == real(other):
+        return True
+    try:
+        return path.samefile(other)
+    except (OSError, ValueError):  # one of them is not there
+        return False
+
+
+def free_name(path: Path) -> Path:
+    """Return a name that is free: the file itself, or with the first number that none has."""
+    names = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in range(2, 10_000))
+    return next((name for name in (path, *names) if not name.exists()), path)
 
 
 def _words(error: OSError | ValueError) -> str:

@@ -15,6 +15,7 @@ from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
 from dcmp_hil.recording.again import run_again
 from dcmp_hil.recording.compare import compare
+from dcmp_hil.recording.foreign import named_in
 from dcmp_hil.recording.reader import read_run, recording_in
 
 if TYPE_CHECKING:
@@ -30,26 +31,33 @@ if TYPE_CHECKING:
 _MAY_CHANGE = ("observer", "controller", "model")
 
 
-def write_exports(file: Path, *, csv: Path | None, parquet: Path | None, rrd: Path | None) -> None:
+def write_exports(
+    file: Path, *, csv: Path | None, parquet: Path | None, rrd: Path | None, force: bool
+) -> None:
     """Write what was asked for.
 
     Raises
     ------
     ConfigError
-        If nothing was, or a file would overwrite the recording.
+        If nothing was, a file is there already, or would overwrite the recording.
+    IncompleteError
+        If the recording lacks something; what is right is written.
     """
     targets = [(csv, export.to_csv), (parquet, export.to_parquet), (rrd, export.to_rrd)]
     if not any(path for path, _ in targets):
         raise ConfigError("Nothing to write: say --csv FILE, --parquet FILE or --rrd FILE.")
-    try_places({"--csv": csv, "--parquet": parquet, "--rrd": rrd}, {"the recording": recording_in(file)})
+    places = {"--csv": csv, "--parquet": parquet, "--rrd": rrd}
+    try_places(places, {"the recording": recording_in(file)}, force=force)
     run = _read(file)
+    for key, kind in named_in(run.rig).items():
+        console.note(f'the rig in it names {key} = "{kind}", which was not imported')
     written, faults = write_each([(path, partial(write, run)) for path, write in targets])
     for path in written:
         console.note(f"wrote {path}")
     _end(run, faults)
 
 
-def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
+def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> None:
     """Run observer and controller over a recording again, and compare.
 
     Raises
@@ -67,7 +75,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
         )
     json_file = json_place(outputs.json)
     places = {"--csv": outputs.csv, "--rrd": outputs.rrd, "--json": json_file}
-    try_places(places, {"the recording": recording_in(file)})
+    try_places(places, {"the recording": recording_in(file)}, force=outputs.force)
     run = _read(file)
     if not len(run.rows):
         raise _incomplete(run) if run.damage else ConfigError(f"{run.path}: no period is in it.")
@@ -76,7 +84,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs) -> None:
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
         raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
-    again = run_again(run, _changed(run.rig, keys))
+    again = run_again(run, _changed(run.rig, keys, trust=trust), trust=trust)
     result = compare(run, again, start)
     lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
     figures = {"identical": result.identical, "rows": result.rows, **lines}
@@ -135,8 +143,11 @@ def _tell_faults(run: RecordedRun) -> None:
         )
 
 
-def _changed(rig: Rig, overrides: Sequence[str]) -> Rig | None:
-    """Return the rig with other gains; None for the same."""
+def _changed(rig: Rig, overrides: Sequence[str], *, trust: bool) -> Rig | None:
+    """Return the rig with other gains; None for the same.
+
+    Classes that the overrides name are looked for where the recording says only if it is trusted.
+    """
     if not overrides:
         return None
     for override in overrides:
@@ -146,7 +157,7 @@ def _changed(rig: Rig, overrides: Sequence[str]) -> Rig | None:
                 f"{', '.join(_MAY_CHANGE)} can be changed afterwards."
             )
     table = json.loads(json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str))
-    return load_table(table, overrides, rig.folder)
+    return load_table(table, overrides, rig.folder if trust else None)
 
 
 def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Table:

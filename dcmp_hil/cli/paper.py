@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.options import JsonFile
+from dcmp_hil.cli.options import Force, JsonFile
 from dcmp_hil.errors import ConfigError
 
 
@@ -16,6 +16,7 @@ def paper(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where figures 1 to 4 go.")] = Path("paper"),
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Only the table.")] = False,
     json_file: JsonFile = None,
+    force: Force = False,
 ) -> None:
     """Reproduce the paper: figures 1 to 4, and what its printed equations cost.
 
@@ -23,11 +24,13 @@ def paper(
     """
     from dcmp_hil.cli.outputs import json_place, try_folder, try_places, write_each
     from dcmp_hil.cli.paper_view import misprint_table, reproduction_table
-    from dcmp_hil.paper import as_json, draw, reproduce
+    from dcmp_hil.paper import FIGURES, as_json, draw, reproduce
 
-    try_places({"--json": json_place(json_file)})
+    places = {"--json": json_place(json_file)}
     if not no_figures:
         try_folder("--out", out)
+        places |= {f"--out {name}": out / name for name in FIGURES if (out / name).exists()}
+    try_places(places, force=force)
     with console.err.status("running the paper's simulation, as meant and as printed ..."):
         reproduction = reproduce()
     drawn: list[Path] = []

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dcmp_hil.cli.options import JsonFile
+from dcmp_hil.cli.options import Force, JsonFile
 
 _COLUMNS = "Columns and units (found by name where not given)"
 _FILE = "What the file does not say"
@@ -170,6 +170,15 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     no_write: Annotated[
         bool, typer.Option("--no-write", help="Write only the files named.", rich_help_panel=_OUTPUT)
     ] = False,
+    force: Force = False,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust",
+            help="Import the classes, and read the files, that the rig in a recording names: its code runs.",
+            rich_help_panel=_OBSERVER,
+        ),
+    ] = False,
 ) -> None:
     """Run an observer over a recording and judge its velocity by a zero-phase reference.
 
@@ -199,10 +208,12 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         figures={"start": window_from, "cutoff": cutoff},
         overrides=tuple(overrides or ()),
     )
-    outputs = replaying.Outputs(json=json_file, csv=csv, rrd=rrd, by_default=not no_write)
+    outputs = replaying.Outputs(
+        json=json_file, csv=csv, rrd=rrd, by_default=not no_write, force=force, rig=rig
+    )
     if file.suffix == ".mcap" or file.is_dir():
         from dcmp_hil.cli.own_recording import replay_own
 
-        replay_own(file, given, outputs)
+        replay_own(file, given, outputs, trust=trust)
     else:
         replaying.execute(file, given.column_options(), given.settings(), outputs)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rich.table import Table
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.outputs import json_place, try_places, write_each
+from dcmp_hil.cli.outputs import free_name, json_place, try_places, write_each
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.replay import read_recording, replay, write_csv, write_rrd
 
@@ -27,12 +27,18 @@ class Outputs(NamedTuple):
         Of the columns; None for the default name in the current folder.
     by_default
         Whether the default names are written at all.
+    force
+        Whether files that are there are overwritten.
+    rig
+        What `--rig` names; None where it does not.
     """
 
     json: str | None
     csv: Path | None
     rrd: Path | None
     by_default: bool
+    force: bool = False
+    rig: str | None = None
 
 
 def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, outputs: Outputs) -> None:
@@ -94,12 +100,17 @@ def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
     """Where CSV and .rrd go: never onto the recording itself."""
     named = outputs.csv, outputs.rrd
     defaults = (Path(f"{file.stem}-replay{suffix}") for suffix in (".csv", ".rrd"))
+    if not outputs.force:  # what an earlier replay left stays
+        defaults = (free_name(default) for default in defaults)
     csv, rrd = (
         target or (default if outputs.by_default else None)
         for target, default in zip(named, defaults, strict=True)
     )
     places = {"--csv": csv, "--rrd": rrd, "--json": json_place(outputs.json)}
-    try_places(places, {"the recording": file})
+    inputs = {"the recording": file}
+    if outputs.rig is not None and outputs.rig.endswith(".toml"):
+        inputs["the rig"] = Path(outputs.rig)
+    try_places(places, inputs, force=outputs.force)
     return csv, rrd
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dcmp_hil.cli.options import JsonFile, Overrides, RigName
+from dcmp_hil.cli.options import Force, JsonFile, Overrides, RigName
 from dcmp_hil.typed_text import readable
 
 
@@ -67,6 +67,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     no_control: Annotated[
         bool, typer.Option("--no-control", help="Do not listen for `dcmp-hil set`, `stop` and `panel`.")
     ] = False,
+    force: Force = False,
 ) -> None:
     """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
 
@@ -86,5 +87,6 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         faults=tuple(faults or ()),
         control=not no_control,
         clear=clear,
+        force=force,
     )
     raise typer.Exit(execute(rig, overrides or (), options))

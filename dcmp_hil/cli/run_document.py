@@ -12,12 +12,15 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dcmp_hil.cli.kept_recording import Kept
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 
 
-def run_document(rig: Rig, note: str, faults: Sequence[str], result: Result, ended_by: str) -> dict[str, Any]:
-    """Return what `--json` writes."""
+def run_document(
+    rig: Rig, note: str, faults: Sequence[str], result: Result, ended_by: str, kept: Kept | None = None
+) -> dict[str, Any]:
+    """Return what `--json` writes; `kept` is None where nothing is recorded, or it was not looked at."""
     return {
         **asdict(result.summary),
         "rig": rig.name,
@@ -25,6 +28,7 @@ def run_document(rig: Rig, note: str, faults: Sequence[str], result: Result, end
         "faults": faults,
         "version": __version__,
         "ended_by": ended_by,
+        "recording": kept and kept.document(),
         "dropped_periods": result.dropped,
         "link": _link(result),
         "device_end": result.device_end and result.device_end._asdict(),

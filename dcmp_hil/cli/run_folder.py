@@ -40,6 +40,15 @@ class RunFolder:
 
     def __init__(self, rig_name: str) -> None:
         self._made_parent = not _RUNS.exists()
+        if _RUNS.is_symlink() and self._made_parent:
+            raise ConfigError(
+                f"{_RUNS} is a link to {_RUNS.readlink()}, which is not there. Make that folder, remove the "
+                "link, or use --no-record."
+            )
+        if not self._made_parent and not _RUNS.is_dir():
+            raise ConfigError(
+                f"{_RUNS} is no folder. Call it something else, start elsewhere, or use --no-record."
+            )
         stem = f"{utc_now():%Y%m%dT%H%M%SZ}-{rig_name}"
         for suffix in ("", *(f"-{n}" for n in range(2, 100))):
             self.path = _RUNS / f"{stem}{suffix}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil import process_log
 from dcmp_hil.cli import console
 from dcmp_hil.cli.foreign_lines import split_stderr
+from dcmp_hil.cli.kept_recording import kept_in, space_warning
 from dcmp_hil.cli.onlookers import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.cli.run_document import run_document, write_json
@@ -22,12 +23,14 @@ from dcmp_hil.cli.watching import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.endings import StopRequest
-from dcmp_hil.errors import DcmpError, TripError
+from dcmp_hil.errors import DcmpError, IncompleteError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.references.table import Table
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.room import room_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun_sink import Viewer
 
+INCOMPLETE = "recording_incomplete"
+"""How a run ended that went well, and is not wholly in its recording."""
 _BOARD = "backend.kind=sim-board"
 _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 
@@ -56,15 +61,17 @@ class Options:
     faults: tuple[str, ...] = ()
     control: bool = True
     clear: bool = False
+    force: bool = False
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     """Run, show, keep; return the exit code."""
-    try_places(
-        {"--json": json_place(options.json_file), "--record": options.record},
-        {"the rig": Path(rig_name)} if rig_name.endswith(".toml") else None,
-    )
+    places = {"--json": json_place(options.json_file), "--record": options.record}
+    read = {"the rig": Path(rig_name)} if rig_name.endswith(".toml") else {}
+    try_places(places, read, force=options.force)
     rig = load_rig(rig_name, overrides)
+    if isinstance(rig.reference, Table):
+        try_places(places, {"the file of the reference": Path(rig.reference.file)}, force=options.force)
     for sentence in warnings(rig):
         console.warn(sentence)
     if rig.backend.kind == "sim" and needs_wire(options.faults):
@@ -79,19 +86,21 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
     """Run, and keep files before anything is printed; the run's own end decides the exit code."""
     folder = RunFolder(rig.name) if options.keep else None
-    began = False
+    began, incomplete = False, ""
     try:
         with split_stderr(folder.path / process_log.FILE if folder else None):
             session = _session(rig, faults, options, folder, stop)
             end = _to_its_end(session)
             began = session.began
             if began:
-                _conclude(session, options, folder, end)
+                incomplete = _conclude(session, options, folder, end)
     finally:
         if folder is not None and not began:  # its error says why
             folder.discard()
     if end.error is not None:
         raise end.error
+    if incomplete and end.code == 0:
+        raise IncompleteError(incomplete)
     return end.code
 
 
@@ -99,6 +108,11 @@ def _session(
     rig: Rig, faults: Faults, options: Options, folder: RunFolder | None, stop: StopRequest
 ) -> Session:
     length = rig.run.duration_s if options.duration is None else options.duration
+    if folder is not None:
+        picture = options.record is None
+        sentence = space_warning(folder.path, room_for(folder.own), rig, length, picture=picture)
+        if sentence:
+            console.warn(sentence)
     return Session(
         rig,
         duration=options.duration,
@@ -173,22 +187,28 @@ def _wants_picture(options: Options) -> bool:
     return options.viewer == "none"
 
 
-def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> None:
-    """Keep and print the figures of every kind of end; an error here is told, and changes no end."""
+def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> str:
+    """Keep and print the figures of every kind of end; return what its folder lacks, a sentence."""
     cut_off = session.stop.requested
     with session.stop.held():
         result = session.result()
-        document = run_document(session.rig, options.note, options.faults, result, end.ended_by)
+        kept = kept_in(folder.own, result.periods, wait=not cut_off) if folder else None
+        ended_by = end.ended_by
+        if kept is not None and not kept.complete and end.error is None and end.code == 0:
+            ended_by = INCOMPLETE
+        document = run_document(session.rig, options.note, options.faults, result, ended_by, kept)
         missing = folder.write(session.rig, document, end.error) if folder else []
+        incomplete = kept.why if kept is not None and kept.why else "".join(missing[:1])
         missing += write_json(options.json_file, document)
     with suppress(KeyboardInterrupt):  # a user need not wait for a slow reader, or for a picture
         if options.json_file == "-":
             console.write_json("-", document)
         else:
-            console.out.print(summary_table(session.rig, result, end.ended_by))
+            console.out.print(summary_table(session.rig, result, ended_by))
         for sentence in missing:
             console.warn(sentence)
         if folder is not None:
             if not cut_off:  # drawing takes seconds, and the end was asked for
                 folder.draw(result)
             folder.tell(options.record, live=options.viewer != "none")
+    return incomplete

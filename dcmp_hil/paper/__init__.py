@@ -6,7 +6,8 @@ draw(reproduction, Path("paper"))
 """
 
 from dcmp_hil.paper.figures import draw
+from dcmp_hil.paper.panels import FIGURES
 from dcmp_hil.paper.reproduction import Reproduction, reproduce
 from dcmp_hil.paper.rows import Misprint, Row, as_json
 
-__all__ = ["Misprint", "Reproduction", "Row", "as_json", "draw", "reproduce"]
+__all__ = ["FIGURES", "Misprint", "Reproduction", "Row", "as_json", "draw", "reproduce"]

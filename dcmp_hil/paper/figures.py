@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.paper.panels import FIGURES, Panel, series
+from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -135,7 +136,8 @@ def _draw_lines(axis: Axes, panel: Panel, table: Table, part: NDArray[np.bool_],
 def _save(figure: Figure, path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path)
+        with whole_file(path) as place:
+            figure.savefig(place, format=path.suffix[1:])
     except OSError as error:
         raise ConfigError(
             f"{path}: {error.strerror or error}. Choose another folder with --out, or use --no-figures."

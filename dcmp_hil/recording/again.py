@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,6 +16,8 @@ from dcmp_hil.live.mailbox import Mailbox
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.predictor import Predictor
 from dcmp_hil.recording.changes import changes_in
+from dcmp_hil.recording.foreign import UnreadTable, check_numbers, refuse_named
+from dcmp_hil.references.table import Table
 from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.trajectory import Trajectory
 from dcmp_hil.values import EventKind, Reference, Sample
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.references import ReferenceSource
     from dcmp_hil.values import Estimate, Event
 
 _AT = {name: place for place, name in enumerate(FIELDS)}
@@ -45,7 +49,7 @@ class Again:
     demand: NDArray[np.float64]
 
 
-def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
+def run_again(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Again:
     """Hand the recorded samples, references and voltages to observer, predictor and controller.
 
     Changes that were made while it went on are made again, in the same period.
@@ -58,14 +62,32 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
         The run.
     rig
         Another observer or controller; None takes those of the run.
+    trust
+        Whether what the recording itself names may be imported, or read: classes, a reference's file.
 
     Raises
     ------
     ConfigError
-        If a class of the user's own cannot be made, or fails in a period that the run survived.
+        If a class of the user's own cannot be made, or fails in a period that the run survived; if the
+        recording names one and is not trusted; if it holds numbers that no run has.
     """
     rig = rig or recorded.rig
-    trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
+    if not trust:
+        refuse_named(recorded, rig)
+    check_numbers(recorded)
+    source: ReferenceSource = rig.reference
+    if isinstance(rig.reference, Table) and not trust and rig.reference == recorded.rig.reference:
+        source = UnreadTable(recorded.path, rig.reference)
+    trajectory = Trajectory(source, rig.reference.soft_start_s)
+    try:
+        return _run_again(recorded, rig, trajectory)
+    except (ArithmeticError, ValueError) as error:
+        raise ConfigError(
+            f"{recorded.path}: its numbers are beyond what observer and controller can take ({error})."
+        ) from None
+
+
+def _run_again(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Again:
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     measured = rig.controller.position == "measured"
     predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
@@ -82,7 +104,7 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None) -> Again:
         demands.append(controller.update(Reference(*row[_AT["position_ahead"] :][:3]), ahead))
         predictor.sent(row[_AT["voltage_sent"]])
         estimates.append(estimate)
-        if made and made[0][0] == sample.t:
+        if made and made[0][0] <= sample.t:  # later where the period itself is missing
             mailbox.put(made.popleft()[1])
         changes.apply(sample.t)
     again = Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
@@ -108,8 +130,9 @@ class _Past:
 
     def __init__(self, recorded: RecordedRun, trajectory: Trajectory, delay: float) -> None:
         self._trajectory, self._delay = trajectory, delay
-        self._lowered = [event.t for event in recorded.events if event.kind is EventKind.LOWERING]
+        self._lowered = deque(event.t for event in recorded.events if event.kind is EventKind.LOWERING)
         self._holds = True
+        self._began = math.inf
 
     def follow(self, row: list[float], estimate: Estimate) -> None:
         """Do what the loop did in this period."""
@@ -117,8 +140,9 @@ class _Past:
         if self._holds:  # the first period of the run, and of the way down
             self._holds = False
             self._trajectory.hold(estimate.position)
-        if t == began:
-            self._trajectory.begin(t, estimate.position)
-        if t in self._lowered:
-            self._trajectory.lower(t + self._delay)
+        if began <= t and began != self._began:  # earlier where the period itself is missing
+            self._began = began
+            self._trajectory.begin(began, estimate.position)
+        if self._lowered and self._lowered[0] <= t:
+            self._trajectory.lower(self._lowered.popleft() + self._delay)
             self._holds = True

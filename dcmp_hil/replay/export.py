@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +58,7 @@ def write_csv(result: ReplayResult, path: Path) -> None:
     table = columns(result)
     digits = [".15g" if name == "time_s" else ".9g" for name in table]
     try:
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with whole_file(path) as place, place.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(table)
             for row in zip(*(values.tolist() for values in table.values()), strict=True):
@@ -91,6 +92,7 @@ def write_rrd(result: ReplayResult, path: Path) -> None:
         f"control/{name}": {"applied": result.applied},
     }
     try:
-        write_series(path, _APPLICATION, recording.time - recording.time[0], plots)
+        with whole_file(path) as place:
+            write_series(place, _APPLICATION, recording.time - recording.time[0], plots)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None

@@ -11,6 +11,7 @@ from dcmp_hil.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
 from dcmp_hil.telemetry.titles import title
+from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,7 +66,8 @@ def draw_run(columns: dict[str, NDArray[np.float64]], title: str, path: Path) ->
 
 def _save(figure: Figure, path: Path) -> None:
     try:
-        figure.savefig(path, dpi=150)
+        with whole_file(path) as place:
+            figure.savefig(place, dpi=150, format=path.suffix[1:] or "png")
     except (OSError, ValueError) as error:  # ValueError: an ending that is no format
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(f"{path}: {reason}. Choose a .png file that you may write.") from None

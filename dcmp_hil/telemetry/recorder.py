@@ -102,6 +102,11 @@ class Recorder:
         return self.recent[-1].sample.t if self.recent else 0.0
 
     @property
+    def written(self) -> int:
+        """Periods taken so far."""
+        return self._ring.written
+
+    @property
     def dropped(self) -> int:
         """Rows lost because the sinks were too slow; after `close`, those never handed on as well."""
         ring = self._audience.ring

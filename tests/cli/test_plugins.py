@@ -64,7 +64,7 @@ def test_class_beside_the_rig_runs_and_its_recording_runs_again(script: Script, 
     moved.mkdir()
     shutil.move(lab, moved / "lab")
     shutil.move(run.parent, moved / "runs")
-    again = script("replay", str(_runs(moved)[0]), cwd=moved / "lab")
+    again = script("replay", str(_runs(moved)[0]), "--trust", cwd=moved / "lab")
     assert (again.code, again.err) == (0, "")
     assert "to the bit" in again.out
 

@@ -1,0 +1,108 @@
+"""Whether a run that has ended is in its recording, wholly."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from dcmp_hil.clock import pause
+from dcmp_hil.recording.ending import ending_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dcmp_hil.config import Rig
+
+_LOOKS, _BETWEEN = 50, 0.02  # s: the telemetry process may still be closing it
+_DATA, _PICTURE = 140.0, 170.0  # bytes a period, of run.mcap and of run.rrd
+_UNTIL_STOPPED = 600.0  # s that a run without a duration is taken for
+_MEGA = 1e-6
+
+
+class Kept(NamedTuple):
+    """What of a run is in its recording.
+
+    Parameters
+    ----------
+    file
+        Its name.
+    complete
+        Whether all of it is.
+    periods
+        How many are; None where the file does not say it.
+    missing
+        Device time from and to, s, and number of periods that are known to be missing.
+    why
+        What is wrong, as a sentence; empty where nothing is.
+    """
+
+    file: str
+    complete: bool
+    periods: int | None
+    missing: tuple[tuple[float, float, int], ...]
+    why: str
+
+    def document(self) -> dict[str, Any]:
+        """Return it for `--json`."""
+        return self._asdict()
+
+
+def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
+    """Look at the end of the recording of a run.
+
+    Parameters
+    ----------
+    path
+        The file.
+    periods
+        How many the run had.
+    wait
+        Whether a second may be waited for a file that is still being closed.
+    """
+    ending = ending_of(path)
+    looks = _LOOKS if wait else 0
+    while ending is None and looks and path.exists():
+        looks -= 1
+        pause(_BETWEEN)
+        ending = ending_of(path)
+    if ending is None:
+        why = "its end is missing" if path.exists() else "it is gone"
+        return Kept(path.name, False, None, (), f"{path}: {why}; what is there can be read.")
+    lost = sum(many for _, _, many in ending.missing)
+    if lost:
+        spans = ", ".join(f"{start:.6g} s to {stop:.6g} s" for start, stop, _ in ending.missing)
+        why = f"{path} misses {lost} of {periods} periods, device time {spans}: the disk was full."
+        return Kept(path.name, False, ending.periods - lost, ending.missing, why)
+    if ending.periods < periods:
+        why = f"{path} misses {periods - ending.periods} of {periods} periods: its disk was too slow."
+        return Kept(path.name, False, ending.periods, (), why)
+    return Kept(path.name, True, ending.periods, (), "")
+
+
+def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture: bool) -> str:
+    """Say that a run will not fit on its disk; nothing where it will.
+
+    Parameters
+    ----------
+    folder
+        Where it is kept.
+    free
+        bytes.
+    rig
+        What is run.
+    length
+        s; 0 is until somebody stops it.
+    picture
+        Whether run.rrd goes there as well.
+    """
+    seconds = length or _UNTIL_STOPPED
+    data = _DATA * rig.loop.rate_hz * seconds
+    needed = data + (_PICTURE * min(rig.loop.rate_hz, 2000.0) * seconds if picture else 0.0)
+    if free >= needed:
+        return ""
+    fits = free / (_DATA * rig.loop.rate_hz)
+    what = f"{seconds:g} s" if length else "ten minutes of a run until Ctrl-C"
+    return (
+        f"{folder}: {_MEGA * free:.3g} MB are free, and {what} at {rig.loop.rate_hz:g} Hz need about "
+        f"{_MEGA * needed:.3g} MB, {_MEGA * data:.3g} of them for run.mcap. Free some space, or choose "
+        f"--duration {max(1.0, float(f'{fits:.2g}')):g} at most; run.rrd ends first."
+    )
