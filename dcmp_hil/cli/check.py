@@ -22,4 +22,4 @@ def check(rig: RigName, overrides: Overrides = None) -> None:
         console.out.print(line, no_wrap=True, crop=terminal, overflow="ellipsis" if terminal else "ignore")
     for sentence in warnings(loaded):
         console.warn(sentence)
-    console.out.print(f"[green]{loaded.name}: no faults[/green]")
+    console.out.print(Text(f"{loaded.name}: no faults", style="green"))

@@ -11,13 +11,29 @@ from rich.console import Console
 from rich.text import Text
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.typed_text import printable
 from dcmp_hil.whole_file import write_text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import ConsoleOptions, RenderableType
+    from rich.segment import Segment
+
     from dcmp_hil.errors import DcmpError
 
-out = Console(soft_wrap=True)
-err = Console(stderr=True, soft_wrap=True)
+
+class SafeConsole(Console):
+    """A console that prints no control character of a text: what a file or a device says is only shown."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield what is printed; the console's own colours are no part of it yet."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text))
+
+
+out = SafeConsole(soft_wrap=True)
+err = SafeConsole(stderr=True, soft_wrap=True)
 
 
 def complain(error: DcmpError) -> None:

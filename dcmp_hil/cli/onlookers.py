@@ -8,8 +8,6 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from dcmp_hil import process_log
 from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.status import StatusLine
@@ -109,4 +107,4 @@ def use_terminal() -> None:
     """Print on the terminal, in the telemetry process, whose own standard error is a log."""
     number = process_log.terminal()
     if number is not None and console.err.file.fileno() != number:
-        console.err = Console(file=streams.text_on(number), soft_wrap=True)
+        console.err = console.SafeConsole(file=streams.text_on(number), soft_wrap=True)

@@ -6,7 +6,9 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.table import Table
+from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.outputs import json_place, try_places, write_each
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 _MAY_CHANGE = ("observer", "controller", "model")
 
 
+@np.errstate(all="ignore")  # a file may hold any number, and what comes of it is written as it is
 def write_exports(
     file: Path, *, csv: Path | None, parquet: Path | None, rrd: Path | None, force: bool
 ) -> None:
@@ -57,6 +60,7 @@ def write_exports(
     _end(run, faults)
 
 
+@np.errstate(all="ignore")
 def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> None:
     """Run observer and controller over a recording again, and compare.
 
@@ -163,14 +167,14 @@ def _changed(rig: Rig, overrides: Sequence[str], *, trust: bool) -> Rig | None:
 def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Table:
     said = "every number is the same, to the bit" if result.identical else "the numbers differ"
     table = Table(
-        title=f"{run.path}: {result.rows} periods again: {said}",
+        title=Text(f"{run.path}: {result.rows} periods again: {said}"),
         title_justify="left",
         box=None,
         padding=(0, 2, 0, 0),
     )
     table.add_column("")
     table.add_column("recorded", justify="right")
-    table.add_column(" ".join(overrides) or "again", justify="right", style="bold")
+    table.add_column(Text(" ".join(overrides) or "again"), justify="right", style="bold")
     for line in result.figures:
         table.add_row(line.name, _number(line.recorded), _number(line.again))
     return table

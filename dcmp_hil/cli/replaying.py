@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.table import Table
+from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.outputs import free_name, json_place, try_places, write_each
@@ -118,7 +119,7 @@ def _table(file: Path, settings: ReplaySettings, result: ReplayResult) -> Table:
     figures = result.figures
     first, last = figures.window_s
     table = Table(
-        title=f"{file.name}: {settings.observer}, {first:.2f} to {last:.2f} s",
+        title=Text(f"{file.name}: {settings.observer}, {first:.2f} to {last:.2f} s"),
         title_justify="left",
         show_header=False,
         box=None,

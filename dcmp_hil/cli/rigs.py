@@ -24,7 +24,7 @@ def rigs(
 
     if copy is not None:
         for path in copy_rig(*copy):
-            console.out.print(f"wrote {path}", highlight=False)
+            console.out.print(f"wrote {path}", highlight=False, markup=False)
         return
     for name in shipped_rigs():
         rig = load_rig(name)

@@ -109,8 +109,12 @@ def _writing(path: Path) -> Iterator[Path]:
     """Yield where to write a file that appears wholly or not at all."""
     try:
         with whole_file(path) as place:
-            yield place
+            try:
+                yield place
+            except (
+                ConfigError,
+                RuntimeError,
+            ) as error:  # Rerun's; it names what takes the place of this file
+                raise ConfigError(str(error).replace(str(place), str(path))) from None
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
-    except RuntimeError as error:  # Rerun's, of a disk that is full
-        raise ConfigError(f"{path}: {error}") from None

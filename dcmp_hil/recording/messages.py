@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.recording.layout import CYCLE_SCHEMA, CYCLES, EVENTS
-from dcmp_hil.recording.records import HEAD, Op, RecordError, channel_in, schema_in
+from dcmp_hil.recording.records import HEAD, KNOWN, Op, RecordError, channel_in, schema_in
 from dcmp_hil.telemetry.ring import FIELDS
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Messages:
                 return
             opcode, length = HEAD.unpack_from(data, at)
             start = at + HEAD.size
-            if length > end - start:
+            if length > end - start or opcode not in KNOWN:
                 self._fault("a block ends inside a record")
                 return
             if opcode == Op.MESSAGE and length == _PERIOD_LENGTH and (count := self._periods(data, at)):

@@ -246,8 +246,8 @@ class _Found:
         run = {readable(str(key))[:_LONGEST]: readable(str(text))[:_LONGEST] for key, text in said.items()}
         if run.get("format") not in {FORMAT, FORMAT_1}:
             raise ConfigError(
-                f"{path}: a recording of format {run.get('format')}; this version reads {FORMAT}. "
-                f"Use dcmp-hil {run.get('version', 'of that time')}."
+                f"{path}: a recording of format {run.get('format', 'unknown'):.20}; this version reads "
+                f"{FORMAT}. Use dcmp-hil {run.get('version', 'of that time'):.40}."
             )
         return run
 

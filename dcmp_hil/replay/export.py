@@ -93,6 +93,9 @@ def write_rrd(result: ReplayResult, path: Path) -> None:
     }
     try:
         with whole_file(path) as place:
-            write_series(place, _APPLICATION, recording.time - recording.time[0], plots)
+            try:
+                write_series(place, _APPLICATION, recording.time - recording.time[0], plots)
+            except ConfigError as error:  # it names the file that takes the place of this one
+                raise ConfigError(str(error).replace(str(place), str(path))) from None
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None

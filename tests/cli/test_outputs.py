@@ -68,12 +68,12 @@ def test_places_that_can_be_written_are_left_as_they_are(tmp_path: Path) -> None
     os.mkfifo(tmp_path / "pipe")
     before = everything(tmp_path)
     names = {"--json": "old", "--record": "new", "--csv": "link", "--rrd": "pipe"}
-    try_places({option: tmp_path / name for option, name in names.items()})
+    try_places({option: tmp_path / name for option, name in names.items()}, force=True)
     try_places({"--json": None, "--record": Path("/dev/full"), "--csv": Path("/dev/full")})
     try_folder("--out", tmp_path / "a" / "b")
     assert everything(tmp_path) == before
     with pytest.raises(ConfigError, match=r"--csv .*is where --json goes, too"):
-        try_places({"--json": tmp_path / "old", "--csv": tmp_path / "." / "old"})
+        try_places({"--json": tmp_path / "old", "--csv": tmp_path / "." / "old"}, force=True)
     with pytest.raises(ConfigError, match=r"--out .*is no folder"):
         try_folder("--out", tmp_path / "old" / "b")
 
@@ -110,7 +110,7 @@ def test_run_that_never_began_leaves_and_replaces_nothing(script: Script, tmp_pa
     for place in ("old.json", "old.rrd"):
         (tmp_path / place).write_text("old")
     before = everything(tmp_path)
-    outputs = ("--viewer", "none", "--json", "old.json", "--record", "old.rrd")
+    outputs = ("--viewer", "none", "--json", "old.json", "--record", "old.rrd", "--force")
     done = script("run", *map(str, arguments), *outputs)
     assert done.code == code
     assert done.out == ""
