@@ -192,7 +192,9 @@ def test_disk_that_fills_up_is_told_for_each_file_after_the_figures(
     assert run.err.count("warning: --json /dev/full: No space left on device.") == 1
     (folder,) = (tmp_path / "runs").iterdir()
     (tmp_path / "old").touch()
-    export = limited(installed, tmp_path, "export", str(folder), "--csv", "csv", "--parquet", "old")
+    export = limited(
+        installed, tmp_path, "export", str(folder), "--csv", "csv", "--parquet", "old", "--force"
+    )
     assert (export.code, export.out) == (2, "")
     assert export.err.count("File too large") == export.err.count("\n") == 2
     assert (tmp_path / "old").exists()  # pyarrow removes what it cannot write to

@@ -17,12 +17,16 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.console import SafeConsole
 from dcmp_hil.errors import DcmpError
 
-_COMMANDS = {
-    ".mcap": lambda name: (("replay", name), ("export", name, "--csv", "/dev/null")),
-    ".csv": lambda name: (("replay", name, "--inertia", "0.16", "--no-write"),),
-    ".toml": lambda name: (("check", name), ("run", name, "--fast", "--duration", "0.05", *_NOTHING)),
-}
 _NOTHING = ("--viewer", "none", "--no-record")
+
+
+def commands(name: str) -> list[tuple[str, ...]]:
+    """Return what a user does with a file of this name."""
+    if name.endswith(".mcap"):
+        return [("replay", name), ("export", name, "--csv", "/dev/null")]
+    if name.endswith(".csv"):
+        return [("replay", name, "--inertia", "0.16", "--no-write")]
+    return [("check", name), ("run", name, "--fast", "--duration", "0.05", *_NOTHING)]
 
 
 def called(*arguments: str) -> tuple[int, str]:
@@ -50,7 +54,7 @@ def main() -> None:
     """Read the files named; print what came of it."""
     os.chdir(sys.argv[1])
     for name in sorted(os.listdir()):  # noqa: PTH208
-        for command in _COMMANDS[Path(name).suffix](name):
+        for command in commands(name):
             began = time.process_time()
             code, printed = called(*command)
             line = {
