@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
-from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.chatter import Chatter
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
@@ -70,9 +69,7 @@ def assemble(
     ConfigError
         If a class named `module:Class` cannot be found or made.
     """
-    backend = open_backend(rig, clock, faults)
-    if isinstance(backend, DeviceBackend):
-        backend.clear = clear
+    backend = open_backend(rig, clock, faults, clear=clear)
     trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it

@@ -109,6 +109,7 @@ class Supervisor:
         self._probe = probe
         self._since = math.nan  # s, device time at which the present phase began
         self._push = 0.0  # V, what the probe wants
+        self._refusal: Stop | None = None  # of the probe
         self._last = 0.0  # V, what was sent last
         self._stop_from = 0.0  # V, where an orderly end begins
         self._cause: Stop | None = None
@@ -153,7 +154,7 @@ class Supervisor:
         except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
             raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
         if not self._has_authority:
-            self._end_ramp(sample.t)
+            self._leave_phase(sample.t)
         self._last = voltage = (
             self._limited(sample.t, demand, self._last)
             if self._has_authority
@@ -185,15 +186,19 @@ class Supervisor:
         assert self._probe is not None  # noqa: S101 - the table leads here only with one
         refusal = self._probe.check(sample)
         if refusal is not None:
-            self.stop(refusal, sample.t)
+            self._refusal = (
+                refusal  # behind what the checks find in this period: a jump is no motion of the arm
+            )
         elif self._probe.over:
             self._cue(Cue.PROBED, sample.t)
         else:
             most = self.limits.voltage_limit
             self._push = max(-most, min(most, self._probe.voltage))
 
-    def _end_ramp(self, t: float) -> None:
-        """Leave ENGAGING with full authority, STOPPING with none."""
+    def _leave_phase(self, t: float) -> None:
+        """Leave PROBING where the probe has refused, ENGAGING with full authority, STOPPING with none."""
+        if self._refusal is not None:
+            self.stop(self._refusal, t)
         gone = t - self._since
         if self.phase is Phase.ENGAGING and not gone < self._engage:
             self._cue(Cue.ENGAGED, t)

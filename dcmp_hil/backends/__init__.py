@@ -52,7 +52,7 @@ class Backend(Protocol):
         ...
 
 
-def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS) -> Backend:
+def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS, *, clear: bool = False) -> Backend:
     """Find the backend that `rig.backend.kind` names and make it; enter it to open the device.
 
     Parameters
@@ -63,6 +63,8 @@ def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS) -> Backend:
         What paces a simulation, and measures how long a device takes.
     faults
         What goes wrong on purpose.
+    clear
+        Whether a fault that waits for a person is cleared.
 
     Raises
     ------
@@ -71,13 +73,23 @@ def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS) -> Backend:
     """
     kind = rig.backend.kind
     if kind in KINDS:
-        return faults.backend(_allowed(find_named(KINDS[kind], BACKEND.key), rig, clock), rig, clock)
+        ours = _allowed(find_named(KINDS[kind], BACKEND.key), rig, clock)
+        return faults.backend(
+            lambda *arguments, **options: _told(ours(*arguments, **options), clear=clear), rig, clock
+        )
     own = _allowed(find_named(kind, BACKEND.key, KINDS, rig.plugin_folders), rig, clock)
 
     def checked(*arguments: Any, **options: Any) -> Backend:
-        return CheckedBackend(make(own, kind, BACKEND, arguments, options), kind)
+        return CheckedBackend(_told(make(own, kind, BACKEND, arguments, options), clear=clear), kind)
 
     return faults.backend(checked, rig, clock)
+
+
+def _told(backend: Any, *, clear: bool) -> Any:
+    """Tell a backend with the flag `clear`, whose device keeps faults, whether they are cleared."""
+    if isinstance(getattr(backend, "clear", None), bool):
+        backend.clear = clear
+    return backend
 
 
 def _allowed(factory: Callable[..., Any], rig: Rig, clock: Clock) -> Callable[..., Any]:

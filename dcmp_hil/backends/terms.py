@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.backends import Device
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.speed_window import resolution
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -45,7 +46,8 @@ class Terms:
     velocity_limit, position_limit
         rad/s and rad either way, at which the host ends a run; None where it watches neither.
     speed_limit_counts_s, travel_limit_counts
-        The same for the device, which keeps them whether the host watches or not.
+        The same for the device, which keeps them whether the host watches or not. Speed is one count in 8 ms
+        higher there: noise of half a count is no speed, and the host's watch comes first.
     boot_wait
         s, for the first sample.
     warn_share, warn_clock_share
@@ -86,6 +88,7 @@ class Terms:
             )
         slew, limits = rig.amplifier.slew, rig.supervisor
         watched = limits.monitors == "all"
+        spare = resolution(math.tau / counts, rig.period)  # the device knows nothing of an encoder's noise
         return cls(
             node=device.node,
             counts_per_rev=round(counts),
@@ -99,7 +102,7 @@ class Terms:
             zero=None if rig.encoder.zero == "at_start" else rig.encoder.zero,
             velocity_limit=limits.velocity_limit_rad_s if watched else None,
             position_limit=limits.position_limit_rad if watched else None,
-            speed_limit_counts_s=_counts(limits.velocity_limit_rad_s, counts),
+            speed_limit_counts_s=_counts(limits.velocity_limit_rad_s + spare, counts),
             travel_limit_counts=_counts(limits.position_limit_rad, counts),
             boot_wait=device.boot_wait_s,
             warn_share=1e-2 * device.warn_percent,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 DAY = 86_400.0  # s
 
+_CELL_MAX = 400  # characters: a longer cell is text, and searching it would take long
 _SPACES = "\u00a0\u202f\u2009"
 _PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
@@ -52,6 +53,8 @@ def number(cell: str, decimal: str = ".") -> float:
     decimal
         ``.`` or ``,``.
     """
+    if len(cell) > _CELL_MAX:
+        return math.nan
     text = cell.strip()
     if decimal == "." and _PLAIN.fullmatch(text):
         return _finite(text)
@@ -85,7 +88,7 @@ def _finite(text: str) -> float:
 
 def unit_in(cell: str) -> str | None:
     """Return the unit that stands behind the number of a cell, if one does."""
-    dressed = _DRESSED.fullmatch(cell.strip())
+    dressed = _DRESSED.fullmatch(cell.strip()) if len(cell) <= _CELL_MAX else None
     tail = dressed and _TAIL.fullmatch(dressed["number"])
     return tail["unit"].strip() if tail and any_unit(tail["unit"]) else None
 
@@ -98,7 +101,7 @@ def label_in(cell: str) -> str | None:
 
 def is_clock(cell: str) -> bool:
     """Whether a cell holds a time of day, with or without a date."""
-    return ":" in cell and _CLOCK.fullmatch(cell.strip()) is not None
+    return ":" in cell and len(cell) <= _CELL_MAX and _CLOCK.fullmatch(cell.strip()) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.replay.cells import is_clock, numbers
 from dcmp_hil.replay.layout import HALF
-from dcmp_hil.replay.names import match, sample_number, split_time
+from dcmp_hil.replay.names import listed, match, sample_number, split_time
 
 if TYPE_CHECKING:
     from dcmp_hil.replay.names import Match
@@ -80,7 +80,7 @@ def choose(table: Table, options: ColumnOptions) -> Columns:
     twice = [name for name in names if table.header.count(name) > 1]
     if twice:
         raise ConfigError(
-            f"{table.path}: more than one column is called {', '.join(twice)}. Give each its own name."
+            f"{table.path}: more than one column is called {listed(twice)}. Give each its own name."
         )
     return found
 
@@ -201,4 +201,4 @@ def _missing(table: Table, quantity: Quantity, more: str) -> ConfigError:
 
 
 def _header(table: Table) -> str:
-    return ", ".join(table.header)
+    return listed(table.header)

@@ -30,6 +30,7 @@ _OTHER_FILES = (
     (b"\x89MCAP", "an MCAP file"),
 )
 _HEAD = 4096  # bytes that the encoding is told from
+_LINE_MAX = 1_000_000  # characters
 _WIDE = 0.3  # share of NULs on one side of UTF-16 text
 _BINARY = 0.1  # share of control characters that no text has
 _END = re.compile(r"\r\n|\n|\r")
@@ -81,6 +82,11 @@ def read_lines(path: Path) -> Lines:
     if nuls:
         notes.append(f"The file has {nuls} NUL characters: a number that holds one is left out.")
     lines = [line.strip("\0\x1a\ufeff") for line in _END.split(text)]
+    if (longest := max(map(len, lines))) > _LINE_MAX:
+        raise ConfigError(
+            f"{path}: a line has {longest:,} characters, which no row of a recording has. Save it as "
+            "comma-separated text, a row a sample."
+        )
     return Lines(path, lines, text.rstrip("\0\x1a")[-1:] in ("\n", "\r", ""), notes)
 
 

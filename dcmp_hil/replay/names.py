@@ -51,6 +51,7 @@ _WHOLE: dict[str, Quantity] = {
 }
 _WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
 _NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
+_NAMES_SHOWN = 30
 _NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
 _UNSURE = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
@@ -216,7 +217,14 @@ def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
         return header[int(column) - 1]
     close = get_close_matches(column, header, n=1)
     hint = f'Did you mean "{close[0]}"?' if close else "Name one of these."
-    raise ConfigError(f'--{quantity}: no column "{column}"; the header has: {", ".join(header)}. {hint}')
+    raise ConfigError(f'--{quantity}: no column "{column}"; the header has: {listed(header)}. {hint}')
+
+
+def listed(names: Sequence[str], between: str = ", ") -> str:
+    """Return names for a message, the first thirty of many."""
+    more = len(names) - _NAMES_SHOWN
+    shown = between.join(names[:_NAMES_SHOWN])
+    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
@@ -224,7 +232,7 @@ def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
     best = [name for rank, name in ranked if rank == ranked[0][0]]
     if len(best) > 1:
         raise ConfigError(
-            f"{quantity}: {' and '.join(best)} look equally likely. "
+            f"{quantity}: {listed(best, ' and ')} look equally likely. "
             f'Say which one it is: --{quantity} "{best[0]}".'
         )
     return best[0] if best else None

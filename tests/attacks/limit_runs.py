@@ -128,7 +128,7 @@ def most_speed(rig: Rig, by: str) -> float:
     limit, one = rig.supervisor.velocity_limit_rad_s, resolution(count, period)
     if by == "host":
         return limit + 2.0 * one + strongest * late * period
-    return limit + 2.0 * one + strongest * (0.5 * count / one + 2.0 * period)
+    return limit + 3.0 * one + strongest * (0.5 * count / one + 2.0 * period)
 
 
 class Healthy(NamedTuple):

@@ -351,6 +351,7 @@ def test_fork_does_not_keep_the_lock_of_a_port(tmp_path: Path) -> None:
 def test_ctrl_c_while_python_imports_is_quiet(tmp_path: Path, at: str) -> None:
     code = (
         "import builtins, os, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a background job ignores it
         "real = builtins.__import__\n"
         "def importing(name, *rest, **more):\n"
         f"    if name == {at!r}: os.kill(os.getpid(), signal.SIGINT)\n"

@@ -182,6 +182,7 @@ def _send_stop(port: str) -> None:
     link = SerialLink(port, 1_000_000)
     link.open()
     try:
+        assert link.receive(60.0) is not None  # the device has seen that its line is up
         link.send(pack(Stop(StopReason.PERSON)))
     finally:
         link.close()

@@ -9,9 +9,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
+from dcmp_hil import load_rig
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.typed_text import printable
 from tests.attacks.hostile.recordings import ESCAPE, recordings
 from tests.installed import environment
@@ -75,6 +80,42 @@ def test_every_hostile_recording_is_a_sentence(tmp_path: Path) -> None:
     assert codes["deep rig", "replay"] == 2
     assert codes["a record of 2**64", "replay"] == 6
     assert not (tmp_path / "files" / "was_here").exists()
+
+
+_RIGS = {
+    "dotted key": "a." * 60_000 + "a=1\n",
+    "dotted key below a megabyte": "a." * 400_000 + "a=1\n",
+    "dotted keys in lines": ("a." * 2_000 + "a=1\n") * 30,
+    "many keys": "".join(f"k{number}=1\n" for number in range(9_000)),
+    "open brackets": "a=" + "[" * 100_000,
+}
+_TABLES = {
+    "digits": "t,x,u\n" + "1" * 5_000_000 + ",2,3\n",
+    "a long cell in each row": "t,x,u\n" + ("0." + "1" * 20_000 + ",2,3\n") * 100,
+    "a wide header": ",".join(f"c{number}" for number in range(20_000)) + "\n" + "1," * 19_999 + "1\n",
+    "names that are alike": "t,x,u" + "".join(f",pos{number} [rad]" for number in range(5_000)) + "\n",
+    "commas": "t,x,u\n" + "," * 900_000 + "\n",
+    "an open quote": 't,x,u\n"' + "a\n" * 200_000,
+}
+
+
+@pytest.mark.parametrize("name", _RIGS)
+def test_hostile_rig_is_refused_in_seconds(name: str, tmp_path: Path) -> None:
+    (tmp_path / "it.toml").write_text(_RIGS[name])
+    began = time.process_time()
+    with pytest.raises(ConfigError):
+        load_rig(tmp_path / "it.toml")
+    assert time.process_time() - began < _MOST_CPU  # the first one takes a minute without its bound
+
+
+@pytest.mark.parametrize("name", _TABLES)
+def test_hostile_table_is_a_short_sentence(name: str, script: Script, tmp_path: Path) -> None:
+    (tmp_path / "it.csv").write_text(_TABLES[name])
+    done = script("replay", "it.csv", cwd=tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("error: ")
+    assert len(done.err) < 3_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["it.csv"]
 
 
 def test_escapes_of_a_file_are_shown_and_not_carried_out(script: Script, tmp_path: Path) -> None:

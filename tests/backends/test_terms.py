@@ -30,12 +30,12 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
     )
     assert terms == Terms(
         *(3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, 24_000, -7, 20.0, 6.2832),
-        *(6366, 2000, 3.0, 0.005, 0.005),
+        *(6491, 2000, 3.0, 0.005, 0.005),
     )
 
 
-@pytest.mark.parametrize(("limit", "counts"), [(2.0, 1303), (6366.2, 4_150_117), (0.01, 6)])
-def test_a_limit_in_counts_is_never_above_the_rigs(limit: float, counts: int) -> None:
+@pytest.mark.parametrize(("limit", "counts"), [(2.0, 1428), (6366.2, 4_150_242), (0.01, 131)])
+def test_a_speed_limit_in_counts_is_the_rigs_and_one_count_in_8_ms(limit: float, counts: int) -> None:
     terms = Terms.of(
         bench(
             "backend.kind=sim-board",
@@ -45,7 +45,7 @@ def test_a_limit_in_counts_is_never_above_the_rigs(limit: float, counts: int) ->
     )
     assert terms.speed_limit_counts_s == counts
     assert terms.velocity_limit is None
-    assert counts * terms.rad_per_count <= limit
+    assert 0.0 <= limit + math.tau / 4096 / 8e-3 - counts * terms.rad_per_count < terms.rad_per_count
 
 
 def test_terms_of_a_rig_without_a_wire_are_refused() -> None:

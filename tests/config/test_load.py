@@ -112,7 +112,7 @@ def test_load_names_file_when_it_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe4"')
     assert "UTF-8" in fault(str(tmp_path / "latin.toml"))
     (tmp_path / "big.toml").write_text("# " + "x" * (1 << 20))
-    assert "1 MiB" in fault(str(tmp_path / "big.toml"))
+    assert "128 KiB" in fault(str(tmp_path / "big.toml"))
 
 
 def test_load_suggests_name_when_rig_is_unknown() -> None:

@@ -24,7 +24,7 @@ _FROM_BOOT = 0.15
 ON_PURPOSE = {"completed", "InjectedError", "InjectedBaseError", *(code.name for code in Code)}
 REASONS = {
     *("speed", "travel", "disturbance", "stuck", "power", "polarity", "not_finite", "gain", "moving"),
-    *("saturation", "tracking", "jump"),
+    *("saturation", "tracking", "jump", "chatter"),
 }
 pytestmark = pytest.mark.usefixtures("untraced")
 

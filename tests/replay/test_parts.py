@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import types
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -145,13 +145,19 @@ def test_rrd_is_written_with_every_plot_from_time_zero(
 ) -> None:
     written: list[tuple[Path, str, np.ndarray, dict[str, dict[str, np.ndarray]]]] = []
     series = types.ModuleType("dcmp_hil.telemetry.series")
-    monkeypatch.setattr(series, "write_series", lambda *call: written.append(call), raising=False)
+
+    def write_series(path: Path, *rest: Any) -> None:
+        path.touch()
+        written.append((path, *rest))
+
+    monkeypatch.setattr(series, "write_series", write_series, raising=False)
     monkeypatch.setitem(sys.modules, series.__name__, series)
     truth = swing(duration=1.0)
     result = replay(truth.recording(time=truth.time + 50.0, velocity=truth.velocity))
     write_rrd(result, tmp_path / "out.rrd")
     ((path, application, time, plots),) = written
-    assert (path, application) == (tmp_path / "out.rrd", "dcmp-hil replay")
+    assert (path.parent, application) == (tmp_path, "dcmp-hil replay")  # beside, and then renamed
+    assert list(tmp_path.iterdir()) == [tmp_path / "out.rrd"]
     assert time == pytest.approx(truth.time, abs=1e-9)
     assert {name: list(lines) for name, lines in plots.items()} == {
         "joint/position_rad": ["measured", "estimate"],

@@ -100,6 +100,7 @@ class System:
         self._disturbed = -_QUIET  # tick of the board at which the last fault was on
         self._plug_in()
         self.host: Host | None = None
+        self.refused = ""  # why the last host could not open it
 
     @property
     def violations(self) -> list[str]:
@@ -111,15 +112,17 @@ class System:
         """Whether what one side says reaches the other, and has for a while."""
         return self.board.tick_count - self._disturbed > _QUIET
 
-    def open(self) -> bool:
-        """Let a host open the device; False if it cannot, or one has it open."""
+    def open(self, *, clear: bool = False) -> bool:
+        """Let a host open the device, with --clear or without; False if it cannot, or one has it open."""
         if self.host is not None:
             return False
         backend = DeviceBackend(self.rig, self._plug_in(), self.clock)
+        backend.clear = clear
         with patch.object(secrets, "randbelow", self.luck.randrange):
             try:
                 backend.__enter__()
-            except DcmpError:
+            except DcmpError as error:
+                self.refused = str(error)
                 return False
         self.host = Host(backend, self.judge, self.board.owner)
         return True
@@ -204,14 +207,23 @@ class System:
                 break
             self.alone(_REST)
         if not abs(self.board.truth().position) < _NEAR:
-            self.reset()  # somebody has brought the arm back: travel counts from here
+            self._unwind()
+            self.reset()  # the count went back by whole turns, which a running board would call jumps
         self.alone(_QUIET + 1)
 
+    def _unwind(self) -> None:
+        """Bring back an arm that hangs whole turns away: travel counts from hanging, over a reset too."""
+        pins = self.board.pins
+        hanging = math.remainder(pins.truth.position, math.tau)
+        pins.truth = pins.truth._replace(position=hanging)
+        plant, _ = pins._healthy  # noqa: SLF001 - no part of the program moves an arm by hand
+        plant._x1 = hanging  # type: ignore[attr-defined]  # noqa: SLF001
+
     def run_again(self) -> None:
-        """Start as after any removal of a fault: it must reach full authority, and obey."""
+        """Start as a person does after any removal of a fault: it must reach full authority, and obey."""
         self.heal()
-        if not self.open():
-            self.judge.note("healed, it does not open")
+        if not self.open(clear=True):
+            self.judge.note(f"healed, it does not open: {self.refused}")
             return
         for _ in range(_AGAIN):
             self.period(0.2)

@@ -16,7 +16,7 @@ from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from dcmp_hil.values import Sample
@@ -64,10 +64,16 @@ class Rung:
 
 @contextmanager
 def rung(
-    f405: Path, carrier: str = "cobs", *, kind: str = "dac", supply_V: float = 10.0, **options: object
+    f405: Path,
+    carrier: str = "cobs",
+    *,
+    kind: str = "dac",
+    supply_V: float = 10.0,
+    overrides: Sequence[str] = (),
+    **options: object,
 ) -> Iterator[Rung]:
     """Arm a board over a carrier; a PWM board has a supply."""
-    rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *STILL)
+    rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *STILL, *overrides)
     if kind == "pwm":
         rig = change_rig(rig, [f"amplifier.supply_V={supply_V}"])
         options.setdefault("supply_mV", 1e3 * supply_V)
