@@ -119,6 +119,7 @@ def _wrong_lines(original: Original, csv: Path) -> str:
     return "" if -1 not in found and found == sorted(set(found)) else "a line that was never written"
 
 
+@pytest.mark.usefixtures("untraced")
 def test_two_thousand_mutants_give_no_wrong_row(originals: list[Original], tmp_path: Path) -> None:
     chance = random.Random(_SEED)
     path, csv = tmp_path / "run.mcap", tmp_path / "out.csv"

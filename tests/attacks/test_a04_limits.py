@@ -123,7 +123,7 @@ def test_limits_reach_the_device_and_end_with_the_session() -> None:
     assert held == {
         Parameter.VOLTAGE_LIMIT_MV: 4000,
         Parameter.SLEW_MV_PER_MS: 700,
-        Parameter.SPEED_LIMIT_COUNTS_S: 1303,
+        Parameter.SPEED_LIMIT_COUNTS_S: 1428,
         Parameter.TRAVEL_LIMIT_COUNTS: 4096,
         Parameter.TRAVEL_ORIGIN_COUNTS: 2**24 - 300,
     }
