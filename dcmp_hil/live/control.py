@@ -92,6 +92,7 @@ class Server:
         self._stopping: asyncio.Task[Stopped] | None = None
         self._unanswered = 0  # who asked for STOP and has no answer yet
         self._watchers: set[asyncio.StreamWriter] = set()
+        self._over = False  # the last words are sent
         self._crowd = Crowd()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -131,7 +132,7 @@ class Server:
             await _send(writer, self.state())
 
     async def _watch(self, writer: asyncio.StreamWriter) -> None:
-        while True:
+        while not self._over:  # behind the last words there is no state any more
             await _send(writer, self.state())
             await asyncio.sleep(_SHOWN)
 
@@ -207,6 +208,7 @@ class Server:
             if not self._unanswered:
                 break
             await asyncio.sleep(_LOOK)
+        self._over = True
         ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
         for writer in tuple(self._watchers):
             with suppress(OSError):

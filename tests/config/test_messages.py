@@ -170,8 +170,8 @@ def test_message_shows_line_and_remedy_when_file_is_no_toml(tmp_path: Path, line
     ("text", "words"),
     [
         ("[loop]\n[loop]\n", "Cannot declare [loop] twice"),
-        ("a = " + "[" * 5000, "nested too deeply"),
-        ("a = " + "9" * 5000, "endless number"),
+        ("a = " + "[" * 4000, "nested too deeply"),
+        ("a = " + "9" * 5000, "a line of more than 4096 characters"),
     ],
     ids=["twice", "deep", "long"],
 )
