@@ -226,6 +226,7 @@ def test_the_end_takes_two_seconds_at_most_whatever_the_process_does(number: sig
     fill(apart, 100)
     assert apart.pid is not None
     os.kill(apart.pid, number)
+    os.waitid(os.P_PID, apart.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)  # until then it may still work
     began = time.monotonic()
     apart.close()
     assert time.monotonic() - began < module._LEAVING + 0.5  # noqa: SLF001 - and what the scheduler needs
