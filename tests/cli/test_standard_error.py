@@ -77,11 +77,13 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
             watcher.connect(str(places.socket_of(run.pid)))
         watchers[0].sendall(b'{"do": "watch"}\n')  # as a panel does; the second one asks for nothing
         watchers[2].sendall(b'{"do": "wat')  # in the middle of a request
+        lines = watchers[0].makefile("rb")
+        assert lines.readline()  # it watches
         if end == "stop":
             watchers[1].sendall(b'{"do": "stop"}\n')
         else:
             run.send_signal(signal.SIGINT)
-        with watchers[0].makefile("rb") as lines:
+        with lines:
             last = list(lines)[-1]
         _, err = run.communicate(timeout=BOUND)
         for watcher in watchers:
