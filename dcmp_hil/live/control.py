@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 _LONGEST = 1 << 16  # bytes of a request
 _ANSWER = 1.0  # s for the loop to take a change
 _LOOK = 0.002  # s
-_LATE = 0.05  # s, for requests that are on their way when the run ends
 _SHOWN = 0.1  # s between two states that are sent to whoever watches
 _ROUND = 0.05  # s between two looks at the run: whether it lives, and its newest period
 _HANDLERS = 4  # rounds between two looks of the loop at its signal handlers
@@ -205,11 +204,11 @@ class Server:
 
     async def say_goodbye(self) -> None:
         """Answer who waits, and tell whoever watches how the run ended."""
+        await asyncio.sleep(_ROUND)  # requests that are on their way, a STOP among them, are read first
         for _ in range(round(_ANSWERS / _LOOK)):
             if not self._unanswered:
                 break
             await asyncio.sleep(_LOOK)
-        await asyncio.sleep(_LATE)
         self._over = True
         ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
         for writer in tuple(self._watchers):
