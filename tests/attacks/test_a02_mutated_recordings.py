@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import resource
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ from dcmp_hil.recording.reader import RecordedRun, read_run
 from dcmp_hil.recording.writer import Recording
 from tests.attacks.mutations import KINDS, mutant, records
 from tests.helpers import bench
+from tests.memory import forget_peak, peak_mb
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -154,7 +154,7 @@ def test_two_thousand_mutants_give_no_wrong_row(originals: list[Original], tmp_p
     assert {kind.partition(":")[0] for kind in told} == set(KINDS)
     assert sum(told.values()) == _MUTANTS
     print(dict(sorted(told.items())))  # noqa: T201 - the table, for who asks with -s
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 1024 * 2 * _MEMORY_MB
+    assert peak_mb() - before < _MEMORY_MB
 
 
 def test_blocks_behind_a_hole_are_read_and_the_hole_has_its_time(

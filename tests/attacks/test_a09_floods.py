@@ -57,8 +57,7 @@ class _Panel(NamedTuple):
             connection.close()
 
     def peak_mb(self) -> float:
-        lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
-        return next(1e-3 * float(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+        return peak_mb(self.process.pid)
 
 
 @pytest.fixture

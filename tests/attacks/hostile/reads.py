@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import os
-import resource
 import sys
 import time
 import traceback
@@ -16,6 +15,7 @@ from dcmp_hil import cli
 from dcmp_hil.cli import console
 from dcmp_hil.cli.console import SafeConsole
 from dcmp_hil.errors import DcmpError
+from tests.memory import peak_mb
 
 _NOTHING = ("--viewer", "none", "--no-record")
 
@@ -64,7 +64,7 @@ def main() -> None:
                 "printed": printed[:20_000],
                 "long": len(printed),
                 "cpu": time.process_time() - began,
-                "MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+                "MB": peak_mb(),
             }
             print(json.dumps(line), file=sys.__stdout__, flush=True)
 
