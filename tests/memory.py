@@ -1,7 +1,7 @@
 """The largest resident memory of a process's own program, as Linux counts it.
 
-`getrusage` is not asked: its `ru_maxrss` outlives `exec`, so a child that a large process starts begins with the peak
-of its parent.
+`getrusage` is not asked: its `ru_maxrss` outlives `exec`, so a child that a large process starts begins with
+the peak of its parent.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ import pytest
 from dcmp_hil.live.client import status, stop
 from dcmp_hil.live.places import socket_of
 from tests.live.processes import BOUND, own_folder, started, until, until_running
+from tests.memory import peak_mb
 from tests.panel.browser import browser, needed
 from tests.panel.test_browser import address_of, free_port
 
