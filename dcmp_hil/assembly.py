@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
-from dcmp_hil.chatter import Chatter
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.fault_injection import NO_FAULTS
-from dcmp_hil.limits import Limits
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
-from dcmp_hil.monitors import DisturbanceWatch, Finite, Ranges
 from dcmp_hil.observers.known_friction import KnownFriction
 from dcmp_hil.observers.super_twisting import SuperTwisting, watch_floor
-from dcmp_hil.outliers import Outliers
-from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.predictor import Predictor
-from dcmp_hil.probe import probe_for
-from dcmp_hil.speed_window import resolution
-from dcmp_hil.supervisor import Supervisor
+from dcmp_hil.safety.chatter import Chatter
+from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
+from dcmp_hil.safety.outlier_filter import Outliers
+from dcmp_hil.safety.polarity_check import probe_for
+from dcmp_hil.safety.speed_resolution import resolution
+from dcmp_hil.safety.supervisor import Supervisor
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
 from dcmp_hil.trajectory import Trajectory

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dcmp_hil.controllers import Controller
     from dcmp_hil.live.changes import Changes
     from dcmp_hil.observers import Observer
-    from dcmp_hil.outliers import Outliers
-    from dcmp_hil.overruns import Overruns
     from dcmp_hil.predictor import Predictor
-    from dcmp_hil.supervisor import Supervisor
+    from dcmp_hil.safety.deadline_monitor import Overruns
+    from dcmp_hil.safety.outlier_filter import Outliers
+    from dcmp_hil.safety.supervisor import Supervisor
     from dcmp_hil.trajectory import Trajectory
 
 

@@ -101,7 +101,7 @@ class EventKind(StrEnum):
 class PhaseData(NamedTuple):
     """Of PHASE."""
 
-    phase: str  # a value of `dcmp_hil.supervisor.Phase`
+    phase: str  # a value of `dcmp_hil.safety.supervisor.Phase`
 
 
 class ProbeData(NamedTuple):

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from dcmp_hil.diagnosis import Diagnosis
+from dcmp_hil.safety.diagnosis import Diagnosis
 from dcmp_hil.values import Sample
 from tests.helpers import setting
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dcmp_hil.faults import meaning_of
+from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.values import Fault
 
 

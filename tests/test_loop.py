@@ -11,8 +11,8 @@ import pytest
 from dcmp_hil import loop, run
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import TripError
-from dcmp_hil.outliers import Outliers
-from dcmp_hil.overruns import Overruns
+from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.outlier_filter import Outliers
 from dcmp_hil.stop import Stop
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench

@@ -9,7 +9,7 @@ import pytest
 
 from dcmp_hil.assembly import make_supervisor
 from dcmp_hil.errors import TripError
-from dcmp_hil.monitors import DisturbanceWatch, Finite, Ranges
+from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
 from dcmp_hil.values import Estimate, Fault, Sample
 from tests.helpers import T, bench, setting, spoilt
 

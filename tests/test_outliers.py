@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dcmp_hil.outliers import Outliers
+from dcmp_hil.safety.outlier_filter import Outliers
 from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T

@@ -10,7 +10,7 @@ import pytest
 
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DeadlineError
-from dcmp_hil.overruns import Overruns
+from dcmp_hil.safety.deadline_monitor import Overruns
 from dcmp_hil.stop import Urgency
 from dcmp_hil.values import Timing
 from sim_backend.backend import SimBackend

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from dcmp_hil.errors import TripError
-from dcmp_hil.probe import Probe
+from dcmp_hil.safety.polarity_check import Probe
 from dcmp_hil.values import Event, ProbeData, Sample
 
 T = 1e-3

@@ -13,12 +13,12 @@ import pytest
 import dcmp_hil
 from dcmp_hil.assembly import make_limits, make_outliers, make_supervisor
 from dcmp_hil.errors import DeadlineError, Explanation, TripError
-from dcmp_hil.monitors import Finite, Ranges
-from dcmp_hil.overruns import Overruns
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
-from dcmp_hil.probe import Probe
+from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.monitors import Finite, Ranges
+from dcmp_hil.safety.polarity_check import Probe
+from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.stop import Stop, Urgency
-from dcmp_hil.supervisor import Phase
 from dcmp_hil.values import Estimate, Sample, Timing
 from tests.helpers import T, bench
 

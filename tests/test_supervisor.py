@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.limits import Limits
+from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.stop import Stop, Urgency
-from dcmp_hil.supervisor import Phase, Supervisor
 from dcmp_hil.values import Estimate, Event, EventKind, Reference, Sample
 
 _ANY, _AT_REST = Sample(0.0, 0.0, 0.0), Estimate(0.0, 0.0, 0.0)

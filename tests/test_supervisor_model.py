@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from dcmp_hil.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
 
 Table = dict[Phase, dict[Cue, Phase]]
 Path = tuple[Phase, ...]

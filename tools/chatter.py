@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.chatter import BLOCK, limit_V_s
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.errors import ConfigError, DcmpError, TripError
+from dcmp_hil.safety.chatter import BLOCK, limit_V_s
 from sim_backend.backend import SimBackend
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.backends import refusals
 from dcmp_hil.backends.caller import PATIENCE
-from dcmp_hil.faults import name_of
+from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, State, StopReason
 

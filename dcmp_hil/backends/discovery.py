@@ -15,7 +15,7 @@ from dcmp_hil.backends.links import make_link
 from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.errors import ConfigError, DcmpError
-from dcmp_hil.faults import name_of
+from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.wire.messages import Hello, Identity, SampleReport, State
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.faults import name_of
+from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, Health, State
 

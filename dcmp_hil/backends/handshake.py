@@ -14,7 +14,7 @@ from dcmp_hil.backends.comparison import differences, remarks
 from dcmp_hil.backends.history import history_of
 from dcmp_hil.backends.parameters import Parameters
 from dcmp_hil.errors import BackendError, ConfigError
-from dcmp_hil.faults import meaning_of
+from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import (
     Drive,

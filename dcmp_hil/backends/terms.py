@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.backends import Device
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.speed_window import resolution
+from dcmp_hil.safety.speed_resolution import resolution
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig

@@ -12,7 +12,7 @@ from dcmp_hil.config.words import toml_value
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
-from dcmp_hil.probe import probe_for
+from dcmp_hil.safety.polarity_check import probe_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

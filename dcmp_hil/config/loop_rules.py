@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.chatter import FLOOR_V_S
 from dcmp_hil.config.words import number
 from dcmp_hil.controllers.pd_compensated import PdSettings
 from dcmp_hil.observers import ObserverContext
 from dcmp_hil.observers.paper import PaperSettings
 from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.safety.chatter import FLOOR_V_S
 from dcmp_hil.stability import LinearLoop, LoopSpec, bandwidths
 
 if TYPE_CHECKING:

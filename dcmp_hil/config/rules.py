@@ -9,7 +9,7 @@ from dcmp_hil.config.loop_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.config.words import number
 from dcmp_hil.observers.super_twisting import bandwidth_floor
-from dcmp_hil.speed_window import lowest_limit
+from dcmp_hil.safety.speed_resolution import lowest_limit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

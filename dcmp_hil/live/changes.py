@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Protocol, cast
 from dcmp_hil.controllers import Gains
 from dcmp_hil.endings import StopRequest
 from dcmp_hil.live.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
-from dcmp_hil.supervisor import Phase
+from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.chatter import Chatter
     from dcmp_hil.controllers import Controller
     from dcmp_hil.live.change import Change
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
     from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.safety.chatter import Chatter
     from dcmp_hil.trajectory import Trajectory
 
 RAMP = 0.25  # s, over which gains go from old to new

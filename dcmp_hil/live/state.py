@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.faults import meaning_of
-from dcmp_hil.supervisor import Phase
+from dcmp_hil.safety.device_faults import meaning_of
+from dcmp_hil.safety.supervisor import Phase
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ from dcmp_hil import load_rig, loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DcmpError
-from dcmp_hil.speed_window import resolution
+from dcmp_hil.safety.speed_resolution import resolution
 from tests.attacks.hostile.wrong_observers import KINDS
 
 if TYPE_CHECKING:

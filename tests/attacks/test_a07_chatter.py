@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 
 from dcmp_hil import TripError, load_rig, run
-from dcmp_hil.chatter import FLOOR_V_S, Chatter, cause_of, limit_V_s
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.knobs import knobs
 from dcmp_hil.live.settable import changed
+from dcmp_hil.safety.chatter import FLOOR_V_S, Chatter, cause_of, limit_V_s
 from dcmp_hil.stop import Urgency
 from dcmp_hil.values import EventKind, Sample
 from tests.helpers import T, bench

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.limits import Limits
-from dcmp_hil.monitors import Finite
+from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.monitors import Finite
+from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.stop import Stop, Urgency
-from dcmp_hil.supervisor import Phase, Supervisor
 from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
 
 if TYPE_CHECKING:

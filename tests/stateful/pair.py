@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
 from tests.stateful.device_model import Command, Device, Rules, State
 
 if TYPE_CHECKING:

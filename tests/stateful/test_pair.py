@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
 from tests.stateful.device_model import NEXT, Command, Device, Rules, State
 from tests.stateful.pair import SMALL, Model, search, stuck
 

@@ -11,9 +11,9 @@ from hypothesis.stateful import run_state_machine_as_test
 
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.goodbye import Goodbye
-from dcmp_hil.limits import Limits
-from dcmp_hil.monitors import Finite
-from dcmp_hil.supervisor import TABLE, Cue, Phase, Supervisor
+from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.monitors import Finite
+from dcmp_hil.safety.supervisor import TABLE, Cue, Phase, Supervisor
 from dcmp_hil.values import Fault
 from sim_backend.board import build, hostlib
 from tests.stateful.machine import Machine
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("untraced")
 def _table(phase: Phase, cue: Cue, following: Phase) -> Callable[[Patch], None]:
     changed = {here: dict(cues) for here, cues in TABLE.items()}
     changed[phase][cue] = following
-    return lambda patch: patch.setattr("dcmp_hil.supervisor.TABLE", changed)
+    return lambda patch: patch.setattr("dcmp_hil.safety.supervisor.TABLE", changed)
 
 
 def _method(kind: type, name: str, other: Any) -> Callable[[Patch], None]:

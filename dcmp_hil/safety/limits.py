@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.governor import Bounds, Governor
+from dcmp_hil.safety.governor import Bounds, Governor
 from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Event, EventKind, LimitData, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.chatter import Chatter
+    from dcmp_hil.safety.chatter import Chatter
     from dcmp_hil.values import Estimate, Sample
 
 _SAID_EVERY = 1.0  # s, each limit

@@ -6,9 +6,9 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dcmp_hil.diagnosis import Diagnosis
 from dcmp_hil.errors import Explanation
-from dcmp_hil.faults import meaning_of
+from dcmp_hil.safety.device_faults import meaning_of
+from dcmp_hil.safety.diagnosis import Diagnosis
 from dcmp_hil.stop import Stop
 from dcmp_hil.values import Fault
 

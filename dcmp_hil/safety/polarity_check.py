@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dcmp_hil.diagnosis import moved_by
+from dcmp_hil.safety.diagnosis import moved_by
 from dcmp_hil.stop import Stop
 from dcmp_hil.values import Event, EventKind, ProbeData
 

@@ -12,8 +12,8 @@ from dcmp_hil.values import Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from dcmp_hil.limits import Limits
-    from dcmp_hil.probe import MotorGain, Probe
+    from dcmp_hil.safety.limits import Limits
+    from dcmp_hil.safety.polarity_check import MotorGain, Probe
     from dcmp_hil.stop import Check
     from dcmp_hil.values import Estimate, Sample
 
