@@ -39,7 +39,7 @@ def run(
     window_from
         s, device time from which the summary's figures count.
     sinks
-        Who else looks on: sinks, or better functions that make one, such as
+        Further sinks of the run, or better functions that make one, such as
         ``partial(RerunSink, rig=view_of(rig), record=Path("run.rrd"), viewer="spawn")``. In real time a
         function that can be pickled is called in the telemetry process, beside the loop; a sink that is there
         already runs on a thread of this process, which costs the loop its punctuality.

@@ -23,7 +23,7 @@ _DELIMITERS = ",;\t"
 
 
 class Text(NamedTuple):
-    """A CSV file as text, before anybody knows which of its columns matter.
+    """A CSV file as text, before it is known which of its columns matter.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class StopRequest:
 
     @property
     def exit_code(self) -> int:
-        """0 if nobody asked, or Ctrl-C or STOP did; 128 + n for signal n."""
+        """0 without a request, after Ctrl-C and after STOP; 128 + n for signal n."""
         return 0 if self.signal in (None, signal.SIGINT) else 128 + self.signal
 
     @property
@@ -99,7 +99,7 @@ class StopRequest:
             self._give_back()
 
     def wake(self, descriptor: int) -> None:
-        """Have the number of each signal written to `descriptor` at once, whatever Python does just now."""
+        """Have the number of each signal written to `descriptor` at once, even during Python code."""
         if self._before and descriptor >= 0:
             self._woken = descriptor
             self._woken_before = signal.set_wakeup_fd(descriptor, warn_on_full_buffer=False)

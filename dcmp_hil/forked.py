@@ -13,7 +13,7 @@ _ours: set[int] = set()
 
 
 def keep_from_forks(descriptor: int) -> int:
-    """Have `descriptor` lead nowhere in processes that are forked from now on; return it."""
+    """Redirect `descriptor` to /dev/null in every process that is forked from now on; return it."""
     _ours.add(descriptor)
     return descriptor
 

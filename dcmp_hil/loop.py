@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Telemetry(Protocol):
-    """Whoever wants to see the periods; must return at once."""
+    """A receiver of the loop's cycles; `record` must return at once."""
 
     def record(self, cycle: Cycle) -> None:
         """Take one period."""
@@ -32,7 +32,7 @@ class Telemetry(Protocol):
 
 
 class Stop(Protocol):
-    """Whether somebody asked for the end."""
+    """Whether the end was requested."""
 
     requested: bool
 
@@ -56,9 +56,9 @@ class Line:
 
 
 def run(line: Line, until: float, stop: Stop) -> float:
-    """Run periods until device time reaches `until`, or somebody asks for the end.
+    """Run cycles until device time reaches `until`, or the end is requested.
 
-    The backend must be open, and whoever opened it closes it: that drives 0 V however this ends.
+    The backend must be open, and its owner closes it: that drives 0 V however this function ends.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 Why none of it can lock the machine or starve telemetry: the loop sleeps until its next tick, and gives up CPU
 and interpreter lock with that. Should a late loop not get to sleep for 80 ms, RLIMIT_RTTIME brings SIGXCPU
 and every thread goes back to normal; should Python not get to run that handler, the kernel keeps 5 % of each
-second for everybody else. Telemetry is a process of its own, and children start as normal processes; a thread
-of ours runs below the loop, and gets the interpreter lock within the switch interval.
+second for all other processes. Telemetry is a process of its own, and children start as normal processes; a
+thread of ours runs below the loop, and gets the interpreter lock within the switch interval.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class RealTime:
             self._undo.close()
 
     def _step_down(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - what a handler is given
-        """Go back to normal priorities: somebody ran for too long without a sleep."""
+        """Restore normal priorities: one of our threads ran for too long without a sleep."""
         _restore(dict.fromkeys(_threads(), (os.SCHED_OTHER, 0)))
         self.grants.append(
             Grant(
@@ -180,7 +180,7 @@ def _quiet_collector(timing: TimingSection, undo: ExitStack) -> None:  # noqa: A
 
 
 def _switch_sooner(timing: TimingSection, undo: ExitStack) -> None:
-    """Let whoever looks on hold the interpreter lock for so long at most while the loop waits for it."""
+    """Bound the time for which another thread holds the interpreter lock while the loop waits for it."""
     undo.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(1e-6 * timing.switch_interval_us)
 
@@ -208,7 +208,7 @@ def _pin(timing: TimingSection, undo: ExitStack) -> None:
 
 
 def _be_first(timing: TimingSection, undo: ExitStack) -> None:
-    """Put the loop before everybody, and our other threads before every normal program.
+    """Give the loop the highest priority, and our other threads one above every normal program.
 
     Without the latter a thread that holds the interpreter lock could lose its CPU to such a program, and the
     loop would wait for both.

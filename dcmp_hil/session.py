@@ -54,17 +54,17 @@ class Session:
     window_from
         s, device time from which the figures count.
     sinks
-        Who else looks on: sinks, or functions that make one. In real time a function that can be pickled is
+        Further sinks of the run, or functions that make one. In real time a function that can be pickled is
         called in the telemetry process, and its sink shares nothing with the loop; every other sink runs on a
         thread of this process, which costs the loop its punctuality.
     keep_columns
         False for long runs: memory then stays bounded.
     stop
-        Asked once a period; its own unless somebody listens for signals earlier already.
+        Asked once a cycle; its own unless the caller listens for signals already.
     warn
         Told, in a sentence, what of telemetry the run goes on without.
     control
-        Who may change the run while it goes on; None for nobody.
+        The interface through which the run may be changed while it goes on; None for no changes.
     faults
         What goes wrong on purpose, as for `run`; or faults that are prepared for this rig already.
     clear
@@ -137,7 +137,7 @@ class Session:
         self._realtime_factor = math.nan
 
     def run(self) -> None:
-        """Run to the end; whatever the end is, the amplifier is at 0 V and the sinks are closed after it.
+        """Run to the end; after every kind of end the amplifier is at 0 V and the sinks are closed.
 
         Raises
         ------

@@ -46,5 +46,5 @@ class Check(Protocol):
     """One thing watched, every period."""
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
-        """Return why the run must stop; None if it may go on. It raises nothing and calls nobody back."""
+        """Return why the run must stop; None if it may go on. Raises and calls back nothing."""
         ...

@@ -11,7 +11,7 @@ from dcmp_hil.values import Reference
 if TYPE_CHECKING:
     from dcmp_hil.references import ReferenceSource
 
-LOWERING = 2.0  # s, from wherever the arm is to hanging
+LOWERING = 2.0  # s, from any position of the arm to hanging
 _CHANGING = 1.0  # s, from one reference into another, at least
 _FASTEST, _HARDEST = 2.0, 10.0  # rad/s and rad/s2 that a change of position adds at most
 

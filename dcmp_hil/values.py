@@ -12,7 +12,7 @@ class Fault(IntEnum):
     NONE = 0
     HOST_SILENT = 1  # the device heard no valid command for longer than its watchdog allows
     LINK_DOWN = 2  # the line hung up, or the bus went off
-    STOPPED = 3  # somebody sent STOP
+    STOPPED = 3  # STOP was sent
     CORRUPT_LINK = 4  # 10 of the last 100 frames were damaged
     OVER_SPEED = 5
     OVER_TRAVEL = 6

@@ -112,7 +112,7 @@ class Caller:
         return None if message is None else (node, message)
 
     def listen(self, seconds: float) -> None:
-        """Hear whatever comes for so long."""
+        """Read and sort every message that arrives within `seconds`."""
         self._listen_until(self._clock.now_ns() + int(1e9 * seconds))
 
     def hear_sample(self, timeout: float) -> SampleReport | None:

@@ -236,7 +236,7 @@ def _open_bus(settings: CanSettings, *, listen_only: bool) -> can.BusABC:
         raise OpenError(
             f"{interface}: its driver is missing: {_on_one_line(error)}. See python-can's page of it."
         ) from error
-    except Exception as error:  # drivers raise whatever they like
+    except Exception as error:  # drivers raise exceptions of any type
         raise _cannot_open(settings, error) from error
 
 
@@ -284,6 +284,6 @@ def _on_one_line(error: BaseException) -> str:
 
 
 def _is_full(error: can.CanOperationError) -> bool:
-    """Whether a frame found no room: nobody acknowledges, or the bus is busier than the adapter."""
+    """Whether the adapter's queue is full: no node acknowledges, or the bus is busier than the adapter."""
     words = str(error).lower()
     return "full" in words or "buffer space" in words or "could not send message" in words

@@ -17,7 +17,7 @@ class ClockRatio:
     A sample may arrive late and never early, so the earliest arrival of a window of 256 ticks shows the
     shortest delay of the line. How that moves from window to window is the error of the clock; the median
     over the newest twelve leaves out those in which this computer stood still. A clock that goes wrong later,
-    in whichever minute of a run, shows two seconds later at 1 kHz.
+    in any minute of a run, shows two seconds later at 1 kHz.
 
     Parameters
     ----------

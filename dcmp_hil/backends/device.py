@@ -42,7 +42,7 @@ _SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: t
 class DeviceBackend:
     """Reads SAMPLEs, writes DRIVEs, and leaves the amplifier at 0 V.
 
-    Signs, counts per revolution and zero are applied here and nowhere else. The device is the sample clock:
+    Signs, counts per revolution and zero are applied in this class only. The device is the sample clock:
     `read` waits for its next frame.
 
     Parameters
@@ -72,7 +72,7 @@ class DeviceBackend:
         self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2  # periods that a command holds
         self._bridge_ns = int(_MOST_LOST * 1e9 * rig.period)
         self._heard_ns = 0
-        self._forgotten = False  # the device has given us up, and may be somebody else's
+        self._forgotten = False  # the device has ended our session, and another host may own it
         self._answered = 0  # tick of the SAMPLE that was answered last
         self._meter = LinkMeter(link, 1e9 * rig.period)
         self._rates = terms.warn_share, terms.warn_clock_share
@@ -192,7 +192,7 @@ class DeviceBackend:
         return UNKNOWN_TRUTH
 
     def _give_up_after(self, gap_ns: int) -> NoReturn:
-        """Nobody can say any more which period it is; the device has its watchdog."""
+        """Stop counting periods after a gap that is too long to count; the device has its watchdog."""
         self._forgotten = gap_ns > _SURELY_NS
         raise refusals.stood_still(self._link.name, 1e-9 * gap_ns)
 
@@ -284,7 +284,7 @@ class DeviceBackend:
         raise refusals.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
 
     def _leave(self, error: BaseException | None) -> None:
-        """Say goodbye; after a trip, or where there is nobody to wait for, STOP."""
+        """Disarm the device; send STOP instead after a trip, or if the device does not answer."""
         caller = Caller(self._link, self._clock, self._node, self._tick)
         if isinstance(error, BackendError):
             if not self._forgotten:

@@ -128,7 +128,7 @@ def _can_channels() -> Iterator[tuple[str, str]]:
     configs: list[Any] = []
     try:
         for driver in _DRIVERS:
-            with contextlib.suppress(Exception):  # drivers raise whatever they like
+            with contextlib.suppress(Exception):  # drivers raise exceptions of any type
                 configs.extend(can.detect_available_configs(interfaces=driver))
     finally:
         logging.disable(logging.NOTSET)

@@ -92,9 +92,10 @@ def _open_devices(process: Path) -> Iterator[int]:
 
 
 def _command(process: Path) -> str:
+    unknown = "another program"
     try:
         words = (process / "cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
-        return "somebody"
+        return unknown
     names = [Path(word).name for word in words if word and not word.startswith("-")]
-    return names[1] if len(names) > 1 and names[0].startswith("python") else names[0] if names else "somebody"
+    return names[1] if len(names) > 1 and names[0].startswith("python") else names[0] if names else unknown

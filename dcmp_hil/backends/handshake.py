@@ -94,8 +94,8 @@ class Handshake:
         Raises
         ------
         OpenError
-            If nobody, somebody else's device, or another version answers, if what it says cannot be, or it
-            does not arm.
+            If no device, a device of another host, or another version answers, if its answer is impossible,
+            or if it does not arm.
         ConfigError
             If the device is not what the rig says.
         """
@@ -146,7 +146,7 @@ class Handshake:
             self._caller.say(Stop(StopReason.REQUESTED))
 
     def _give_back(self) -> None:
-        """Release the session, so that whoever tries next need not wait until it lapses."""
+        """Release the session, so that the next host need not wait until it lapses."""
         with contextlib.suppress(BackendError):
             self._parameters.get(Parameter.TICK)
             for _ in range(_RELEASES):
@@ -167,7 +167,7 @@ class Handshake:
         raise refusals.silence(name, wait)
 
     def _introduce(self) -> str:
-        """Become the owner, and be told so twice: on a bus an IDENTITY may be the answer to somebody else."""
+        """Become the owner, confirmed by two answers: on a bus an IDENTITY may answer another host."""
         told, identity = 0, None
         for _ in range(_HELLOS):
             identity = self._ask_who()

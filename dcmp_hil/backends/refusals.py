@@ -88,7 +88,7 @@ def other_protocol(name: str, firmware: str, protocol: int) -> OpenError:
 
 
 def owned(name: str) -> OpenError:
-    """Make the error for a device that somebody else has."""
+    """Return the error for a device that another host owns."""
     return OpenError(
         f"{name}: another host owns the device. End its run first; what it leaves behind is given up by "
         "the device after half a second."

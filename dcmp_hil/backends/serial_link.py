@@ -101,7 +101,7 @@ class SerialLink:
             self._poll = select.poll()
             self._poll.register(port.fileno(), select.POLLIN)
             if not self._listen_only:
-                self._write(_DELIMITER)  # ends whatever the line carried before
+                self._write(_DELIMITER)  # ends a frame that the line carried before
         except BaseException:
             self.close()
             raise
@@ -215,7 +215,7 @@ def open_port(path: str, baud: int) -> serial.Serial:
 
 def write_now(port: serial.Serial, data: bytes) -> None:
     """Write what there is room for; pyserial's own write spins for ever on a full buffer."""
-    with contextlib.suppress(BlockingIOError):  # nobody reads at the other end; its watchdog knows
+    with contextlib.suppress(BlockingIOError):  # no reader at the other end; the device's watchdog acts
         os.write(port.fileno(), data)
 
 

@@ -1,7 +1,7 @@
 """An slcan adapter as a bus of python-can: alone on its port, strict, never waiting.
 
 python-can's own is deaf for ever after one byte that is no ASCII, waits for every write, and speaks to a port
-before it could know that somebody else has it.
+before it could know that another program has it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Linux's own CAN interfaces, which are brought up by somebody else and may go down under a run."""
+"""Linux's own CAN interfaces, which an administrator brings up and which may go down during a run."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def went_down(settings: Can) -> LinkError:
     """Say that it was taken down."""
     return LinkError(
         f"socketcan {settings.channel}: the interface went down. The device goes to 0 V by itself. Bring it "
-        f"up again: {_up(settings)}. If nobody took it down, look at the adapter."
+        f"up again: {_up(settings)}. If it was not taken down on purpose, look at the adapter."
     )
 
 

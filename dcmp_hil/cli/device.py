@@ -76,7 +76,7 @@ def _run_command(rig: str, overrides: list[str]) -> list[str]:
 
 
 def _keep_running(running: Any, rig: Rig, stop: StopRequest) -> None:
-    """Tick until somebody asks for the end."""
+    """Run the virtual device's ticks until the end is requested."""
     from rich.live import Live
 
     ticks = max(1, round(_STATUS_S / rig.period))

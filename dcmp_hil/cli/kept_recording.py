@@ -90,7 +90,7 @@ def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture
     rig
         What is run.
     length
-        s; 0 is until somebody stops it.
+        s; 0 is until the user stops it.
     picture
         Whether run.rrd goes there as well.
     """

@@ -61,7 +61,7 @@ class _Ticks:
 
 
 def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
-    """Print messages for `duration` (s, 0 for ever) or until somebody ends it; return the exit code."""
+    """Print messages for `duration` (s, 0 for ever) or until the user ends it; return the exit code."""
     clock = MonotonicClock()
     link = make_link(rig.backend, clock)
     caller, brief, ticks = Caller(link, clock, 0), _Brief(), _Ticks()

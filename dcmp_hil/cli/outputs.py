@@ -24,9 +24,9 @@ def try_places(
     Parameters
     ----------
     places
-        Option to file; None is nowhere.
+        Option to file; None if the option was not given.
     inputs
-        What is read, in words, to its file: nothing is ever written there, whatever it is called.
+        What is read, in words, to its file: no output is ever written to this file, by any of its names.
     force
         Whether a file that is there may be overwritten.
 

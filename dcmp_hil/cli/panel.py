@@ -23,7 +23,7 @@ def panel(
 ) -> None:
     """Serve a page for this machine's browser: gains, reference, what was applied, and STOP.
 
-    It finds the newest run by itself, and the next one when that has ended. Only somebody who has the
+    It finds the newest run by itself, and the next one when that has ended. Only a browser that has the
     address that is printed, with its token, may use it.
     """
     from dcmp_hil.errors import ConfigError

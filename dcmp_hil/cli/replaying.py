@@ -23,7 +23,7 @@ class Outputs(NamedTuple):
     Parameters
     ----------
     json
-        Of the figures; ``-`` for standard output, None for nowhere.
+        Of the figures; ``-`` for standard output, None for no output.
     csv, rrd
         Of the columns; None for the default name in the current folder.
     by_default

@@ -25,7 +25,7 @@ def attach(port: int | None, *, web: bool) -> None:
     place = find_served() if port is None else port
     if not window.speaks_http2(place):
         raise ConfigError(
-            f"Nobody serves a run on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
+            f"No run is served on {window.LOOPBACK}:{place}. Start one with: run --viewer serve"
         )
     if web:
         with suppress(KeyboardInterrupt), web_viewer(place):

@@ -143,7 +143,7 @@ def _unstable(loop: LinearLoop) -> str:
     needed = f"{number(_LEAST)} to {number(_MOST)} times model.ku_rad_s2_V are needed"
     remedy = "Leave out the gains that were changed to get those that fit, or raise loop.rate_hz."
     if margins is None:
-        return f"the loop is not stable with these gains, whatever the motor's: {needed}. {remedy}"
+        return f"the loop is not stable with these gains, for any gain of the motor: {needed}. {remedy}"
     return (
         f"the loop is stable for motor gains of {margins.low:.2f} to {margins.high:.2f} times "
         f"model.ku_rad_s2_V only{reserve}; {needed}. {remedy}"

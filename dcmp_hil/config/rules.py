@@ -22,7 +22,7 @@ _LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
 _FEWEST_COUNTS = 2  # from the encoder's middle to a limit of travel
 _HELD = 0.95  # of the motor's torque
 _LEAST = 1e-6  # of any key that must be above 0
-_REASON = {  # by unit: the largest that anybody may mean
+_REASON = {  # by unit: the largest plausible value
     "1_s": 1e5,
     "1_s2": 1e9,
     "rad_s3": 1e7,

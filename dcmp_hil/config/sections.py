@@ -162,11 +162,11 @@ class TimingSection(Section):
     realtime: Literal["try", "enforce", "off"] = "try"
     """`try`: take what the system grants, and say what not; `enforce`: refuse to start without it, exit 5."""
     priority: Annotated[int, Field(ge=2, le=98)] = 80
-    """SCHED_FIFO priority of the loop; the threads that look on get 1."""
+    """SCHED_FIFO priority of the loop; telemetry threads get 1."""
     cpu: Annotated[int, Field(ge=0, le=4095)] | Literal["any"] = "any"
     """Number of the one CPU that the loop runs on, or "any"."""
-    switch_interval_us: Annotated[int, Field(ge=20, le=5000)] = 100  # at 10 us nobody gets far any more
-    """Python threads that look on hand the interpreter back after this long, us."""
+    switch_interval_us: Annotated[int, Field(ge=20, le=5000)] = 100  # at 10 us no thread makes progress
+    """Interval after which a Python thread that holds the interpreter lock releases it, us."""
     overrun: Literal["hold", "skip", "stop"] = "hold"
     """A late period: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""
     overrun_limit: Annotated[int, Field(ge=1, le=20)] = 5

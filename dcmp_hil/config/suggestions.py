@@ -1,4 +1,4 @@
-"""Remedies: what somebody may have meant by an unknown key, or by a number in quotes."""
+"""Remedies: what the author of a rig may have meant by an unknown key, or by a number in quotes."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def factor(unit: str, wanted: str) -> float | None:
 
 
 def unit_named(text: str) -> str:
-    """Return the unit that somebody wrote as text, such as "rad/s" or "kHz"; empty if none is known."""
+    """Return the unit that was written as text, such as "rad/s" or "kHz"; empty if none is known."""
     return _BY_LOWER.get(text.strip().replace("/", "_").lower(), "")
 
 

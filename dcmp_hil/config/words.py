@@ -75,7 +75,7 @@ def _bounds(schema: Mapping[str, Any]) -> str:
 
 
 def printable(text: str) -> str:
-    """Escape whatever a terminal would obey instead of showing."""
+    """Return `text` with every character escaped that a terminal would obey instead of showing."""
     return "".join(_visible(char) for char in text)
 
 

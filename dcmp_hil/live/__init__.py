@@ -47,9 +47,9 @@ class Control(Protocol):
         rig
             As it runs.
         ring
-            Descriptor of the memory of the ring of periods; None if nobody else may see it.
+            Descriptor of the memory of the ring of periods; None if no other process may see it.
         warn
-            Told if nobody listens any more; called from any thread.
+            Called, from any thread, if the control process no longer listens.
         """
         ...
 

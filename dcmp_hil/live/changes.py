@@ -147,7 +147,7 @@ class LiveChanges:
             if change is None:
                 return
             what = self._make(change, t)
-        except Exception as error:  # noqa: BLE001 - whatever is in the slot, the run goes on
+        except Exception as error:  # noqa: BLE001 - with any content of the slot, the run goes on
             self._mailbox.reply(number, Answer(FAILED, t))
             sentence = f"a change could not be applied: {error!r}"
             self._notify(Event(t, "WARN", EventKind.CONTROL, sentence))

@@ -1,6 +1,6 @@
 """The control process: listens for this user's changes, checks them, and hands them to the loop.
 
-It leaves as soon as its end of the line to the run is closed, whatever closed it.
+It leaves as soon as its end of the line to the run is closed, for any reason.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 _LONGEST = 1 << 16  # bytes of a request
 _ANSWER = 1.0  # s for the loop to take a change
 _LOOK = 0.002  # s
-_SHOWN = 0.1  # s between two states that are sent to whoever watches
+_SHOWN = 0.1  # s between two states that are sent to every watcher
 _ROUND = 0.05  # s between two looks at the run: whether it lives, and its newest period
 _HANDLERS = 4  # rounds between two looks of the loop at its signal handlers
 _ANSWERS = 0.3  # s for those who asked for STOP to be answered in, after the end
@@ -178,7 +178,7 @@ class Server:
             rig, change = changed(self._rig, overrides)
             if (change.gains, change.tuning, change.reference) == (None, None, None):
                 return {"ok": True, "said": change.words, "t": self._ring.newest}
-            answer = await self._hand_on(self._mailbox.put(change))
+            answer = await self._dispatch(self._mailbox.put(change))
         except DcmpError as error:
             return {"ok": False, "said": str(error)}
         if answer is None:
@@ -194,7 +194,7 @@ class Server:
         said = [f"{change.words}, applied at {answer.t:.3f} s", *(f"warning: {one}" for one in doubtful)]
         return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
 
-    async def _hand_on(self, number: int) -> Answer | None:
+    async def _dispatch(self, number: int) -> Answer | None:
         for _ in range(round(_ANSWER / _LOOK)):
             if answer := self._mailbox.answer(number):
                 return answer
@@ -203,7 +203,7 @@ class Server:
         return self._mailbox.answer(number)
 
     async def say_goodbye(self) -> None:
-        """Answer who waits, and tell whoever watches how the run ended."""
+        """Answer every waiting client, and tell every watcher how the run ended."""
         await asyncio.sleep(_ROUND)  # requests that are on their way, a STOP among them, are read first
         for _ in range(round(_ANSWERS / _LOOK)):
             if not self._unanswered:

@@ -1,4 +1,4 @@
-"""The mailbox between control process and loop: one slot in shared memory, and nobody ever waits for it."""
+"""The mailbox between control process and loop: one slot in shared memory, without a lock."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Mailbox:
     Parameters
     ----------
     memory
-        Of `SIZE` bytes, zeros at first; None takes some that nobody shares.
+        Of `SIZE` bytes, zeros at first; None allocates memory that is not shared.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Mailbox:
     # ---------------------------------------------------------------- the side that asks
 
     def put(self, change: Change) -> int:
-        """Put a change into the slot, whatever was in it; return its number.
+        """Put a change into the slot, over any earlier one; return its number.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class Mailbox:
             self.words[WORD] = FORCED
 
     def answer(self, number: int) -> Answer | None:
-        """Return what became of the change of that number; None as long as nobody took it."""
+        """Return what became of the change of that number; None as long as the loop has not taken it."""
         if self.words[_TAKEN] != number:
             return None
         return Answer(self.words[_ANSWER], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))

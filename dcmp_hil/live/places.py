@@ -1,4 +1,4 @@
-"""Where the runs of this user listen: a socket each, in a folder that is nobody else's."""
+"""Where the runs of this user listen: a socket each, in a folder that only this user may use."""
 
 from __future__ import annotations
 
@@ -81,13 +81,13 @@ def mailbox_of(pid: int) -> Mailbox | None:
 
 
 def _alive(path: Path) -> bool:
-    """Whether somebody listens there; nobody's answer is waited for."""
+    """Whether a process listens there; no answer is waited for."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(_PATIENCE)
         try:
             probe.connect(str(path))
         except (ConnectionRefusedError, FileNotFoundError):
             return False
-        except OSError:  # a full queue: somebody is there, if slow
+        except OSError:  # a full queue: a process listens, if slowly
             return True
     return True

@@ -41,7 +41,7 @@ main({line}, {setup}, {parent})
 class ControlProcess:
     """Lets `dcmp-hil set`, `stop` and `panel` change a run, from a process that shares nothing with the loop.
 
-    It sees to it that STOP and signals end the run, whatever runs in it.
+    It sees to it that STOP and signals end the run, with any code in it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A run in a few numbers and words, for whoever looks on from outside."""
+"""A run in a few numbers and words, for clients outside of its process."""
 
 from __future__ import annotations
 

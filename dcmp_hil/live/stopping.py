@@ -1,6 +1,6 @@
 """STOP: asked for in the mailbox, confirmed by the last words of the loop, or forced, within a second.
 
-Whoever asks is outside of the run's process: what runs there may be stuck, and may ignore signals.
+The request comes from outside of the run's process: what runs there may be stuck, and may ignore signals.
 """
 
 from __future__ import annotations

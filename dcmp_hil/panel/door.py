@@ -154,12 +154,12 @@ class Visit(asyncio.Protocol):
         return self._answering is not None
 
     def pause_writing(self) -> None:
-        """Have whoever answers wait."""
+        """Make the answering task wait until the client has read more."""
         if self._answering is not None:
             self._answering.pause_writing()
 
     def resume_writing(self) -> None:
-        """Have whoever answers go on."""
+        """Let the answering task go on writing."""
         if self._answering is not None:
             self._answering.resume_writing()
 
@@ -205,7 +205,7 @@ class Visit(asyncio.Protocol):
             f"HTTP/1.1 {int(status)} {reason}\r\nContent-Type: text/plain\r\n"
             f"Content-Length: {len(reason)}\r\nConnection: close\r\n\r\n{reason}".encode()
         )
-        transport.write_eof()  # closed at once, with bytes that nobody read, it would take the answer back
+        transport.write_eof()  # closed at once, with bytes unread, it would take the answer back
         self._late = asyncio.get_running_loop().call_later(_PARTING, transport.abort)
 
     def _settled(self) -> None:

@@ -1,4 +1,4 @@
-"""Who may use the page: somebody who was shown its address, from a page that came from here."""
+"""Access to the page: requests with the token of its address, from a page that came from here."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Guard:
     Attributes
     ----------
     token
-        Random; whoever knows it may use the page.
+        Random; a request that carries it may use the page.
     """
 
     def __init__(self, port: int, viewer: str) -> None:

@@ -57,7 +57,7 @@ def head_of(data: bytes) -> Head | None:
     Raises
     ------
     RequestError
-        If it is none that this server answers, whatever may follow.
+        If this server answers no such request, with any body.
     """
     end = data.find(_END)
     head = data[: end + 2] if end >= 0 else data

@@ -1,4 +1,4 @@
-"""Log lines of the web server's libraries: one of a kind, without a traceback, whatever is sent to it."""
+"""Log lines of the web server's libraries: one of a kind, without a traceback, for any request."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def damping(rig: Rig) -> float:
     """Return the damping coefficient of a rig's closed loop, kd / (2 sqrt(kp)) as in section III.C.
 
     kp and kd are not read from the rig but asked of its controller, by moving position and velocity by one
-    unit each: x'' = -f0 x' + (ku/J) V then shows what really acts, whatever factor stands in front.
+    unit each: x'' = -f0 x' + (ku/J) V then shows what really acts, with any factor in front.
     """
     controller, model = make_controller(rig), rig.model.values()
     at_rest = Reference(0.0, 0.0, 0.0)

@@ -51,7 +51,7 @@ class CheckedObserver:
             estimate = self._update(sample)
         except (DcmpError, Interrupted):
             raise
-        except BaseException as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
+        except BaseException as error:  # noqa: BLE001 - after any exception, the cycle ends at 0 V
             self._failure = self._failure or _raised(self._name, self._update, error, sample.t)
             return _NO_ESTIMATE
         if type(estimate) is Estimate:
@@ -105,7 +105,7 @@ class CheckedController:
             voltage = self._update(reference, estimate)
         except (DcmpError, Interrupted):
             raise
-        except BaseException as error:  # noqa: BLE001 - whatever it is, the period ends at 0 V
+        except BaseException as error:  # noqa: BLE001 - after any exception, the cycle ends at 0 V
             self._failure = self._failure or _raised(self._name, self._update, error)
             return math.nan
         if type(voltage) is float and -math.inf < voltage < math.inf:

@@ -93,7 +93,7 @@ def _run_again(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Again
     predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
     past = _Past(recorded, trajectory, rig.delay)
     mailbox = Mailbox()
-    changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_nobody)
+    changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_ignore_event)
     made = deque(changes_in(recorded.events, rig, whole=not recorded.damage))
     estimates, demands = [], []
     for row in recorded.rows.tolist():
@@ -121,8 +121,8 @@ def _check_own(again: Again, *stages: object) -> None:
             raise ConfigError(f"period {int(np.argmax(failed)) + 1}: {failure.error()}") from failure.cause
 
 
-def _nobody(_: Event) -> None:
-    """Tell nobody: it has been told."""
+def _ignore_event(_: Event) -> None:
+    """Drop the event: the recording holds it already."""
 
 
 class _Past:

@@ -141,7 +141,7 @@ def _events(
 
 
 def _gaps(times: NDArray[np.float64], numbers: NDArray[np.int64], total: int | None) -> tuple[Gap, ...]:
-    """Return where numbers are missing; an end that nobody wrote is a gap as well."""
+    """Return where numbers are missing; an end that was not written is a gap as well."""
     if not len(numbers):
         return (Gap(None, None, total),) if total != 0 else ()
     gaps = [Gap(None, float(times[0]), int(numbers[0]) - 1)] if numbers[0] > 1 else []

@@ -249,7 +249,7 @@ def _text(content: bytes, at: int) -> tuple[str, int]:
 
 
 def _unpack_zstd(packed: bytes, size: int) -> bytes:
-    """Unpack one frame: never more than `size`, whatever the frame says of itself."""
+    """Unpack one frame, to `size` bytes at most, for any size that the frame itself states."""
     said = zstandard.get_frame_parameters(packed)
     if said.window_size > _WINDOW:
         raise ValueError("it asks for too much memory")

@@ -1,4 +1,4 @@
-"""Writing a run down as it goes: what was handed over is in the file, whatever happens to this process."""
+"""Writing a run down as it goes: what was handed over is in the file, even if this process is killed."""
 
 from __future__ import annotations
 

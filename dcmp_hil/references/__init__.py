@@ -17,7 +17,7 @@ class ReferenceSource(Protocol):
 
 
 class ReferenceSettings(Section):
-    """What every `[reference]` has, whatever its kind."""
+    """The settings that every kind of `[reference]` has."""
 
     soft_start_s: Annotated[float, Field(ge=0, le=60)] = 2.0
     """Over this time the reference fades in from where the arm is, s; 0 = at once."""

@@ -21,7 +21,7 @@ _MEANINGS = {
         "the lateness in the summary, or raise backend.watchdog_ms (at most 50).",
     ),
     Fault.LINK_DOWN: Meaning("The line to the device hung up", "Look at cable, adapter and bus termination."),
-    Fault.STOPPED: Meaning("Somebody sent STOP", "Find out who and why before you start again."),
+    Fault.STOPPED: Meaning("STOP was sent to the device", "Find out who and why before you start again."),
     Fault.CORRUPT_LINK: Meaning(
         "10 of the last 100 frames at the device were damaged",
         "Look at cable, ground and termination; lower the baud rate.",
@@ -42,7 +42,7 @@ _MEANINGS = {
     ),
     Fault.INTERNAL: Meaning(
         "The board found something wrong with itself",
-        "firmware/README.md says what its detail means: 1 no crystal, 2 nobody wrote its record, ...",
+        "firmware/README.md says what its detail means: 1 no crystal, 2 no record written, ...",
     ),
     Fault.TWO_DEVICES: Meaning(
         "Two devices send under this node: one is in RUN, the other is not",
@@ -56,7 +56,7 @@ _MEANINGS = {
 
 
 def meaning_of(code: int) -> Meaning:
-    """Return a fault in words, whatever the code.
+    """Return a fault in words, for any code.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Telemetry: from the loop to everybody who looks on."""
+"""Telemetry: from the loop to every sink."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Telemetry in a process of its own: the loop shares the interpreter lock with nobody.
+"""Telemetry in a process of its own: the loop shares its interpreter lock with no sink.
 
 The loop writes rows into shared memory, and events into a socket that never blocks. The process writes down
 how far it has come ten times a second; where it ends too early, or does not answer, what is left in the ring
@@ -90,7 +90,7 @@ class Apart:
     pid
         Of the process, once open; None if there is none.
     ring_file
-        Descriptor of the ring's memory, for whoever else looks on.
+        Descriptor of the ring's memory, for other processes that read it.
     """
 
     def __init__(
@@ -224,7 +224,7 @@ class Apart:
             self._send_events()
             channel.shutdown(socket.SHUT_WR)
         if receive_from_working(process, channel, _ANSWER) != FIGURES:
-            with suppress(subprocess.TimeoutExpired):  # where nobody listens any more it has ended already
+            with suppress(subprocess.TimeoutExpired):  # if its end is closed, the process has ended already
                 return how_it_ended(process.wait(_REAPING))
             end_process(process, 0.0)
             return f"did not answer for {_ANSWER} s"
@@ -244,7 +244,7 @@ class Apart:
             message = pickle.dumps(tuple(event._replace(text=event.text[:_LONGEST])))
             try:
                 self._channel.send(message, socket.MSG_DONTWAIT)
-            except OSError:  # no room, or nobody: what nobody takes is taken over at the end
+            except OSError:  # no room, or no reader: what is not read is taken over at the end
                 return
             self._untold.popleft()
 
@@ -262,7 +262,7 @@ class Apart:
         missing = min(self._events - state.events, len(self._told))
         for event in list(self._told)[len(self._told) - missing :]:
             audience.event(event)
-        audience.hand_on()
+        audience.dispatch()
         self.dropped = ring.dropped
 
     def _go_without(self, why: str) -> None:

@@ -1,4 +1,4 @@
-"""Whoever looks on: blocks and events, in order, to each sink; one that raises is dropped and told of."""
+"""Dispatch of blocks and events, in order, to each sink; a sink that raises is dropped and reported."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Sink(Protocol):
 
 
 class Audience:
-    """Hands on what waits in a ring, and events, when it is told to.
+    """Dispatches the rows of a ring and the waiting events to the sinks, when `dispatch` is called.
 
     Parameters
     ----------
     ring
-        Nobody else reads from this one; others over the same memory may.
+        Read by this object only; other rings over the same memory may be read elsewhere.
     sinks
-        Who looks on.
+        The receivers of blocks and events.
     tell
         Takes the event that a sink gave up; None hands it to the other sinks.
     model
@@ -70,9 +70,9 @@ class Audience:
         """Put an event behind those that wait."""
         self._events.append(event)
 
-    def hand_on(self) -> None:
-        """Hand on the events that wait, then the rows."""
-        self._hand_on_events()
+    def dispatch(self) -> None:
+        """Dispatch the events that wait, then the rows."""
+        self._dispatch_events()
         rows = self.ring.drain()
         if len(rows):
             block = Block(rows, self._model)
@@ -80,14 +80,14 @@ class Audience:
         self._report_warnings()
 
     def finish(self) -> None:
-        """Hand on what is left and close the sinks."""
-        self.hand_on()
-        self._hand_on_events()  # a sink that gave up at the last block is news as well
+        """Dispatch what is left and close the sinks."""
+        self.dispatch()
+        self._dispatch_events()  # a sink that gave up at the last block is news as well
         while self._sinks:  # the last one first, so that those before it hear if it gives up
             self._tell(lambda sink: sink.close(), [self._sinks.pop()])
-            self._hand_on_events()
+            self._dispatch_events()
 
-    def _hand_on_events(self) -> None:
+    def _dispatch_events(self) -> None:
         while self._events:
             event = self._events.popleft()
             self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
@@ -104,7 +104,7 @@ class Audience:
         for sink in tuple(self._sinks if sinks is None else sinks):
             try:
                 call(sink)
-            except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
+            except Exception as error:  # noqa: BLE001 - after any error of a sink, the run goes on
                 self._sinks = [other for other in self._sinks if other is not sink]
                 sentence = f"{type(sink).__name__} gave up and was dropped: {error}"
                 self._report(Event(self.ring.newest, "WARN", EventKind.TELEMETRY, sentence))
@@ -117,12 +117,12 @@ def _warnings(sink: Sink) -> Sequence[str]:
 
 
 class Service:
-    """A thread that hands on, ten times a second unless told otherwise, until it is to finish.
+    """A thread that dispatches every `interval`, ten times a second by default, until `finish` is called.
 
     Parameters
     ----------
     audience
-        Nobody else tells it to hand on.
+        Dispatched by this thread only.
     interval
         s between two times.
     """
@@ -142,5 +142,5 @@ class Service:
 
     def _serve(self) -> None:
         while not self.finishing.wait(self._interval):
-            self.audience.hand_on()
+            self.audience.dispatch()
         self.audience.finish()

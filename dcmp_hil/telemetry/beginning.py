@@ -32,7 +32,7 @@ def begin(
 
 
 def warm_up(rig: RigView, _: rr.RecordingStream) -> None:
-    """Make the calls of a block for nobody: the first ones take 80 ms, and the loop would wait for them."""
+    """Make the calls of a block without output: the first take 80 ms, for which the loop would wait."""
     frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
     frames.choose_lines(block)
     stream = rr.RecordingStream("warm-up")

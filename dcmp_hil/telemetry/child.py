@@ -1,7 +1,7 @@
-"""The process that looks on: drains the ring, feeds the sinks, outlives whoever started it by a moment.
+"""The telemetry process: drains the ring, feeds the sinks, and ends shortly after its parent.
 
 The sinks that make a run's figures have the main thread; every other one has a thread of its own, so that a
-viewer that takes nothing delays nobody else. It leaves by itself when its parent says so, or is gone.
+viewer that takes nothing delays no other sink. It leaves by itself when its parent says so, or is gone.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ UP, FIGURES, DONE = b"up", b"figures", b"done"
 _IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
 _CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
 _TRIM_EVERY = 100  # looks into the ring: 10 s
-_ORPHANED = 1.0  # s for those that are late where the parent is gone: there is nobody to look at a window
+_ORPHANED = 1.0  # s for those that are late where the parent is gone: no user looks at a window
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Setup:
 
 
 class State(NamedTuple):
-    """How far the process has come, for whoever has to go on in its place."""
+    """How far the process has come, for the parent that has to go on in its place."""
 
     position: int  # of the ring
     dropped: int  # rows
@@ -127,7 +127,7 @@ class _Watcher:
         self._looks = 0
 
     def serve(self) -> None:
-        """Make the sinks, say so, and hand on until the end."""
+        """Make the sinks, say so, and dispatch until the end."""
         try:
             warnings = self._make_sinks()
         except ConfigError as error:
@@ -141,7 +141,7 @@ class _Watcher:
             while True:
                 waiting.poll(INTERVAL / self._setup.speed)
                 ended = self._take_events() or os.getppid() != self._parent
-                self._hand_on()
+                self._dispatch()
                 if ended:
                     break
         self._say(FIGURES)
@@ -149,7 +149,7 @@ class _Watcher:
         if end:
             self._tell(Event(self._ring.newest, "ERROR", EventKind.END, end.sentence))
         self._close()
-        self._hand_on()
+        self._dispatch()
         self._say(DONE)
         if end and self._setup.unattended:
             finish = pickle.loads(self._setup.unattended)  # noqa: S301 - written by our own parent
@@ -163,7 +163,7 @@ class _Watcher:
                 sink: Sink = pickle.loads(data)()  # noqa: S301 - written by our own parent
             except ConfigError:
                 raise
-            except Exception as error:  # noqa: BLE001 - whatever a looker-on does, the run goes on
+            except Exception as error:  # noqa: BLE001 - after any error of a sink, the run goes on
                 warnings.append(f"A sink could not be made: {type(error).__name__}: {error}")
                 continue
             warnings += getattr(sink, "warnings", ())
@@ -191,8 +191,8 @@ class _Watcher:
             self._taken += 1
             self._tell(Event(*pickle.loads(message)))  # noqa: S301 - written by our own parent
 
-    def _hand_on(self) -> None:
-        self._audience.hand_on()
+    def _dispatch(self) -> None:
+        self._audience.dispatch()
         self._looks += 1
         if self._looks % _TRIM_EVERY == 0:
             trim()

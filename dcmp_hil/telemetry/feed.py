@@ -61,7 +61,7 @@ class Feed:
         Raises
         ------
         Exception
-            Whatever an earlier job raised.
+            The exception that an earlier job raised.
         """
         self._waiting.append(block)
         if block["t"][-1] + 1.5 * self._period - self._waiting[0]["t"][0] < self._span:

@@ -90,5 +90,5 @@ def told_by(backend: Any) -> dict[str, int]:
 
 
 def in_order(counters: Mapping[str, int]) -> list[float]:
-    """Return the counters of HOST, then of DEVICE; NaN for what nobody told."""
+    """Return the counters of HOST, then of DEVICE; NaN for one that was not reported."""
     return [float(counters.get(name, math.nan)) for name in (*HOST, *DEVICE)]

@@ -83,6 +83,6 @@ def _pickled(maker: SinkMaker) -> bytes:
     """Return nothing where it cannot be, or where another process would not find what it names."""
     try:
         data = pickle.dumps(maker)
-    except Exception:  # noqa: BLE001 - whatever a user's objects raise
+    except Exception:  # noqa: BLE001 - a user's object may raise any exception
         return b""
     return b"" if b"__main__" in data else data

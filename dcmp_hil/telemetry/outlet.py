@@ -35,12 +35,12 @@ def _no_farewell() -> None:
 
 
 class Outlet:
-    """Does jobs with a stream, in order, on a thread that may get stuck without harm to anybody.
+    """Does jobs with a stream, in order, on a thread that may get stuck without harm to other threads.
 
     Parameters
     ----------
     stream
-        Nobody else uses it from now on.
+        Used by this object only from now on.
     patience
         s that `do` waits when the thread is behind.
     ending
@@ -106,7 +106,7 @@ class Outlet:
         Raises
         ------
         Exception
-            Whatever an earlier job raised.
+            The exception that an earlier job raised.
         """
         self._raise_what_was_raised()
         if self._stalls(_STALL):
@@ -123,7 +123,7 @@ class Outlet:
         Raises
         ------
         Exception
-            Whatever a job raised.
+            The exception that a job raised.
         """
         end_ns = self._clock.now_ns() + int(within * 1e9)
         done = threading.Event()
@@ -143,7 +143,7 @@ class Outlet:
         Raises
         ------
         Exception
-            Whatever an earlier job raised.
+            The exception that an earlier job raised.
         TimeoutError
             If a file is not finished by then.
         """
@@ -176,7 +176,7 @@ class Outlet:
                 job(self._stream)
                 if self.file is not None:
                     self._stream.flush(timeout_sec=_FLUSH)
-            except Exception as error:  # noqa: BLE001 - told to whoever brings the next job
+            except Exception as error:  # noqa: BLE001 - raised to the caller of the next job
                 self._error = error
             self._began_ns = 0
         self._began_ns = self._clock.now_ns()

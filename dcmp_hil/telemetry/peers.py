@@ -1,4 +1,4 @@
-"""Other users of this computer at a port that serves a dashboard: Rerun's server asks nobody who they are."""
+"""Other users of this computer at a port that serves a dashboard: Rerun's server admits every client."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def strangers(port: int) -> list[int]:
     here = f"0100007F:{port:04X}"
     try:
         rows = [line.split() for line in _TABLE.read_text("ascii").splitlines()[1:]]
-    except OSError:  # not Linux: nobody can tell
+    except OSError:  # not Linux: it cannot be found out
         return []
     users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED}
     return sorted(users - {os.getuid(), _ROOT})

@@ -1,4 +1,4 @@
-"""A picture of a whole run, for where nobody saw it live."""
+"""A picture of a whole run, for runs without a viewer."""
 
 from __future__ import annotations
 

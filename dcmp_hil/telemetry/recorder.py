@@ -1,4 +1,4 @@
-"""From the loop to everybody who looks on: rows into a ring, events beside it, and nothing that waits."""
+"""From the loop to every sink: rows into a ring, events beside it, and nothing that waits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorder", "Sink"]
 
-_IN_LINE = 4096  # rows a block in virtual time, where nobody waits, at most
+_IN_LINE = 4096  # rows a block in virtual time, where no viewer waits, at most
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
 _LAST_BLOCK = 2.0  # s that the end of a run waits for the thread
 
@@ -35,15 +35,15 @@ class Recorder:
     aligner
         Finds the reference at each sample's own instant.
     sinks
-        Who looks on from this process. One that raises is dropped, and an event says so; the run goes on.
+        Sinks in this process. One that raises is dropped, and an event says so; the run goes on.
     recent
         Cycles kept for the black box.
     in_line
-        True in virtual time: blocks are handed on by `record` itself, so that none is ever lost and runs
+        True in virtual time: `record` itself dispatches the blocks, so that none is ever lost and runs
         repeat to the bit. False: a thread does it, and rows are dropped and counted if it falls behind; no
         sinks, no thread.
     apart
-        Who looks on from a process of its own.
+        The telemetry process, with sinks of its own.
     model
         What the host believes of the plant.
     backend
@@ -88,7 +88,7 @@ class Recorder:
             self._left = self._every
             self._look_at_link(t)
             if self._in_line:
-                self._audience.hand_on()
+                self._audience.dispatch()
 
     def event(self, event: Event) -> None:
         """Take an event."""
@@ -108,12 +108,12 @@ class Recorder:
 
     @property
     def dropped(self) -> int:
-        """Rows lost because the sinks were too slow; after `close`, those never handed on as well."""
+        """Rows lost because the sinks were too slow; after `close`, those never dispatched as well."""
         ring = self._audience.ring
         return ring.dropped + (len(ring) if self._closed else 0)
 
     def close(self) -> None:
-        """Hand on what is left and close the sinks; waits for a stuck sink for 2 s at most."""
+        """Dispatch what is left and close the sinks; wait for a stuck sink for 2 s at most."""
         self._closed = True
         if self._in_line:
             self._audience.finish()

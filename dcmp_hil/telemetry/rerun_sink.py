@@ -57,7 +57,7 @@ class RerunSink:
         The .rrd file; None for none.
     viewer
         ``spawn`` opens a window; ``serve`` waits for viewers that come and go, and so does ``web``, whose
-        pages somebody else serves; ``connect`` sends to the viewer that listens on 127.0.0.1:9876.
+        pages another process serves; ``connect`` sends to the viewer that listens on 127.0.0.1:9876.
     application
         Recordings of the same application share the viewer's layout.
     port
@@ -163,7 +163,7 @@ class RerunSink:
                 self.warnings.append(spared(file, "ends here", self._needed))
 
     def _keep_to_ourselves(self) -> None:
-        """End the server where another user is connected to it: who they are is asked nobody by Rerun."""
+        """End the server where another user is connected to it: Rerun does not authenticate its clients."""
         if self.port is None or not (users := strangers(self.port)):
             return
         self.warnings.append(STRANGERS.format(user=users[0], port=self.port))

@@ -60,7 +60,7 @@ class RigView:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-_FIRST = ("controller", "observer", "reference", "loop")  # what is tuned stands where nobody need scroll
+_FIRST = ("controller", "observer", "reference", "loop")  # what is tuned is visible without scrolling
 
 
 def view_of(rig: Rig) -> RigView:

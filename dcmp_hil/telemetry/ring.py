@@ -1,4 +1,4 @@
-"""A ring of fixed rows between the loop, which never waits, and whoever looks on, here or elsewhere."""
+"""A ring of fixed rows between the loop, which never waits, and its readers in any process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def capacity_of(size: int) -> int:
 
 
 class Ring:
-    """One producer, any number of consumers; the oldest rows are overwritten, whoever has read them.
+    """One producer, any number of consumers; the oldest rows are overwritten, read or not.
 
     Every Ring over the same memory has a reading position of its own; one of them alone may push.
 
@@ -55,7 +55,7 @@ class Ring:
     capacity
         Rows kept; the producer may be this far ahead before rows are lost.
     memory
-        Of `size_of(capacity)` bytes, zeros at first; None takes some that nobody shares.
+        Of `size_of(capacity)` bytes, zeros at first; None allocates memory that is not shared.
     """
 
     def __init__(self, capacity: int, memory: mmap.mmap | bytearray | None = None) -> None:
@@ -91,7 +91,7 @@ class Ring:
         return float(self._rows[(written - 1) % self.capacity, 1]) if written else 0.0
 
     def latest(self) -> dict[str, float]:
-        """Return the newest row by `FIELDS`, for whoever needs no other; nothing before the first."""
+        """Return the newest row by `FIELDS`; an empty mapping before the first row."""
         written = self.written
         row = self._rows[(written - 1) % self.capacity].tolist()
         return dict(zip(FIELDS, row[1:], strict=True)) if written and row[0] == written - 1 else {}
@@ -113,7 +113,7 @@ class Ring:
         numbers = np.arange(first, written)
         slots = numbers % self.capacity
         rows = self._rows[slots, 1:]
-        whole = self._rows[slots, 0] == numbers  # after the copy: whoever overwrites a row numbers it first
+        whole = self._rows[slots, 0] == numbers  # after the copy: a row is numbered before it is overwritten
         self.dropped += written - self.position - int(np.count_nonzero(whole))
         self.position = written
         return rows if whole.all() else rows[whole]

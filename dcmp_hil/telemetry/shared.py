@@ -32,7 +32,7 @@ def mapped(file: int, size: int) -> mmap.mmap:
 
 
 class Ledger:
-    """An object written over and over; whoever reads it finds the last one written whole.
+    """An object written over and over; a reader finds the last one written whole.
 
     Parameters
     ----------

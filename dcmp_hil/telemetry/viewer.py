@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 PORT, WEB_PORT = 9876, 9090
 _PORTS_TRIED = 50
-_BUSY = 3.0  # s that a server may take on a busy computer; where nobody listens, that is known at once
+_BUSY = 3.0  # s that a server may take on a busy computer; a port without a listener refuses at once
 _LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
 _ESTABLISHED, _LISTENING = "01", "0A"  # in there
 _HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))  # with empty settings
 _SETTINGS = b"\x04"  # type of the frame that every HTTP/2 server answers with
-_NOWHERE = "http://127.0.0.1:9"  # the port that discards; nobody listens there
+_NOWHERE = "http://127.0.0.1:9"  # the port that discards; no server listens there
 _QUIET = {"CI": "1", "RERUN_ANALYTICS": "0", "HTTPS_PROXY": _NOWHERE, "https_proxy": _NOWHERE}
-"""The viewer phones nobody: neither its analytics nor, which has no switch, whether there is a newer one."""
+"""The viewer asks no server: neither for analytics nor, which has no switch, for a newer version."""
 
 
 def proxy_url(port: int) -> str:
@@ -51,7 +51,7 @@ def free_ports(first: int) -> Iterator[int]:
 
 
 def free_port(first: int = PORT) -> int | None:
-    """Return the first port from `first` on that nobody listens on; None if there is none near."""
+    """Return the first port from `first` on without a listener; None if there is none near."""
     return next(free_ports(first), None)
 
 
@@ -69,7 +69,7 @@ def serves(port: int, pid: int, within: float) -> bool:
     within
         s, the longest that a server takes to start.
     """
-    if not _CONNECTIONS.exists():  # not Linux: nobody can tell whose it is
+    if not _CONNECTIONS.exists():  # not Linux: its owner cannot be found
         return answers(port, within)
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(within * 1e9)
@@ -104,7 +104,7 @@ def _alive(pid: int) -> bool:
 
 
 def answers(port: int, within: float) -> bool:
-    """Tell whether somebody accepts connections on `port` within so many seconds."""
+    """Return whether a server accepts connections on `port` within so many seconds."""
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(within * 1e9)
     while True:
@@ -138,14 +138,14 @@ def viewer_binary() -> Path:
 
 
 def viewer_environment() -> dict[str, str]:
-    """Return this environment so that a viewer asks nobody for anything."""
+    """Return this environment, changed so that a viewer makes no request to the Internet."""
     return {**os.environ, **_QUIET}
 
 
 def start_viewer(port: int) -> subprocess.Popen[bytes]:
     """Open a window on the recording served on `port`; it outlives this process.
 
-    The port must answer already: a viewer that finds nobody does not try again.
+    The port must answer already: a viewer that finds no server does not try again.
 
     Raises
     ------
@@ -188,13 +188,13 @@ def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
 
 
 def served(first: int = PORT) -> list[int]:
-    """Return the ports on which somebody serves a recording, among those that a run would take."""
+    """Return the ports on which a recording is served, among those that a run would take."""
     return [port for port in range(first, first + _PORTS_TRIED) if speaks_http2(port)]
 
 
 def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
     """Wait until `viewer` has fetched what is served on `port`, for 10 s at most."""
-    if not _CONNECTIONS.exists():  # not Linux: nobody can tell
+    if not _CONNECTIONS.exists():  # not Linux: it cannot be found out
         return
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_LINGER * 1e9)

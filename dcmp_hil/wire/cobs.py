@@ -75,7 +75,7 @@ def _decode(chunk: bytes) -> Frame | None:
     if not _LEAST <= length <= _MOST:
         return None
     body, place = bytearray(chunk), chunk[0]
-    while place < length:  # every distance becomes the zero that it stands for; nobody reads the first
+    while place < length:  # every distance becomes the zero that it stands for; the first is not read
         distance = body[place]
         body[place] = 0
         place += distance

@@ -56,7 +56,7 @@ class Result(IntEnum):
 
 
 class Stop(NamedTuple):
-    """STOP: obeyed from anyone, in any session."""
+    """STOP: obeyed from every host, in any session."""
 
     reason: int  # a StopReason
 

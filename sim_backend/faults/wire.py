@@ -116,7 +116,7 @@ class Truncate(RandomFault):
 
 
 class Insert(RandomFault):
-    """Puts random bytes somewhere into a piece."""
+    """Puts random bytes at a random place into a piece."""
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:
         """Return the piece with bytes inside."""

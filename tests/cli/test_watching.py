@@ -170,7 +170,7 @@ def test_view_without_a_display_says_what_else_there_is() -> None:
 def test_view_without_a_run_says_how_to_start_one() -> None:
     with pytest.raises(ConfigError, match="No run is served"):
         attach(None, web=False)
-    with pytest.raises(ConfigError, match=f"Nobody serves a run on .*:{_FIRST + 333}"):
+    with pytest.raises(ConfigError, match=f"No run is served on .*:{_FIRST + 333}"):
         attach(_FIRST + 333, web=False)
 
 

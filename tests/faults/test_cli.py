@@ -26,7 +26,7 @@ QUICK = ("run", "--fast", "--no-record", "--set", "backend.kind=sim-board")
         (("--fault", "wire.drop:p=0.05,at=1s,for=0.2s"), 0, ""),
         (("--fault", "plant.power:at=1.2s"), 4, "as if the motor had no current"),
         (("--fault", "wire.hold:way=up,at=1s"), 4, "heard no valid command"),
-        (("--fault", "firmware.stop:at=1s"), 4, "Somebody sent STOP"),
+        (("--fault", "firmware.stop:at=1s"), 4, "STOP was sent to the device"),
         (("--fault", "firmware.reset:at=1s"), 4, "left RUN by itself"),
         (("--fault", "wire.blackhole:way=down,at=1s"), 3, "no sample for 20 ms"),
         (("--fault", "firmware.version:at=boot"), 3, "speaks protocol"),

@@ -61,7 +61,7 @@ def test_faults_act_without_control_and_in_virtual_time(
 def test_a_fault_that_trips_a_paced_run_leaves_its_black_box(script: Script, tmp_path: Path) -> None:
     done = run(script, "--fault", STOP)
     assert done.code == 4, done.err
-    assert "Somebody sent STOP" in " ".join(done.err.split())
+    assert "STOP was sent to the device" in " ".join(done.err.split())
     assert "Traceback" not in done.err
     (folder,) = (tmp_path / "runs").iterdir()
     assert (folder / "black_box.csv").stat().st_size > 0

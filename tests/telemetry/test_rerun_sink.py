@@ -229,7 +229,7 @@ def test_a_viewer_that_takes_nothing_is_left_behind_and_the_file_stays_whole(
     for k in range(500):
         ring.push(cycle(k), truth(k))
         if k % 100 == 99:
-            audience.hand_on()
+            audience.dispatch()
     audience.finish()
     assert len(sink.warnings) == 1
     assert "the run goes on" in sink.warnings[0]

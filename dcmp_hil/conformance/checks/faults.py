@@ -38,7 +38,7 @@ def stop(client: Client) -> Iterator[str]:
     since = client.after_fence(len(client.samples))
     first = next((seen for seen in since if seen.sample.state == State.FAULT), None)
     if first is None:
-        yield "STOP does not lead from IDLE to FAULT; it is obeyed from anyone"
+        yield "STOP does not lead from IDLE to FAULT; it is obeyed from every host"
         return
     if first.sample.fault_class != Fault.STOPPED:
         yield f"SAMPLE says fault_class {first.sample.fault_class} after STOP, the page 3"
@@ -139,7 +139,7 @@ CHECKS = (
     Check(
         "stop",
         "7",
-        "STOP from anyone leads to FAULT(STOPPED), said at once and every 100 ms; the first cause stays.",
+        "STOP from any host leads to FAULT(STOPPED), said at once and every 100 ms; the first cause stays.",
         stop,
     ),
     Check("clear", "7", "FAULT ends by clear = 0, then clear = 1, both at 0 V.", clear, timed=True),

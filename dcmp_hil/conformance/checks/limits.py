@@ -74,7 +74,7 @@ def speed(client: Client) -> Iterator[str]:
     elif report is not None and report.code != Fault.OVER_SPEED:
         yield f"a speed limit of {limit} count/s led to fault {report.code}, the page says 5"
     elif due is None or fault != due:
-        found = "nowhere" if due is None else f"at tick {due & 255}"
+        found = "at no tick" if due is None else f"at tick {due & 255}"
         yield (
             f"under a speed limit of {limit} count/s FAULT(OVER_SPEED) came at tick {fault & 255}; by the "
             f"counts of its SAMPLEs it is due {found}: the change over 8 ms"
