@@ -19,7 +19,7 @@ PYTEST = $(BIN)/python -m pytest -n 2
 RUN = $(VENV)/.installed-run
 DEV = $(VENV)/.installed-dev
 
-# Whatever the shell or pip.conf says, nothing from outside the environment gets in.
+# Shell variables and pip.conf have no effect on the environment.
 unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 

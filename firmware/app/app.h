@@ -19,12 +19,12 @@
 enum app_failure {
     APP_WELL = 0,
     APP_NO_CRYSTAL = 1,  /* the clock is only about right */
-    APP_NO_RECORD = 2,   /* nobody said what is connected: tools/flash.py */
+    APP_NO_RECORD = 2,   /* no record says what is connected: tools/flash.py */
     APP_NO_MEMORY = 4,   /* the record could not be written */
     APP_NO_LINK = 8,     /* the controller of the link does not answer */
     APP_BAD_RECORD = 16, /* a value in it is outside its range */
     APP_CRYSTAL_STOPPED = 32,
-    APP_CRASHED = 64 /* an exception that nobody expects; the next word is that of the processor */
+    APP_CRASHED = 64 /* an unexpected exception; the next word is that of the processor */
 };
 
 struct app {
@@ -73,7 +73,7 @@ void app_say(struct app *app);
 /* The board has failed. */
 struct dcmp_output app_fail(struct app *app, enum dcmp_fault_code code, int32_t detail, uint32_t now_us);
 
-/* Look whether there is a fault that the log does not have; after whatever was done to the device directly. */
+/* Log a fault that the log does not have yet; to be called after the device was changed directly. */
 struct dcmp_output app_settle(struct app *app, uint32_t now_us);
 
 #endif

@@ -1,4 +1,4 @@
-/* Who is alive: the watchdog of a chip is fed only when everybody who has to work has worked. */
+/* Who is alive: the watchdog of a chip is fed only when every task has worked. */
 #ifndef LIFE_H
 #define LIFE_H
 

@@ -11,7 +11,7 @@ struct dcmp_amplifier {
     bool limited;       /* the newest command is not what is applied */
 };
 
-/* 0 V at once, whatever the slew limit says. */
+/* 0 V at once, regardless of the slew limit. */
 void dcmp_amplifier_cut(struct dcmp_amplifier *amplifier);
 
 void dcmp_amplifier_command(struct dcmp_amplifier *amplifier, int16_t voltage_mV);

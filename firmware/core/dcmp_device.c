@@ -80,7 +80,7 @@ void dcmp_device_link(struct dcmp_device *device, bool up, uint32_t now_us)
 {
     if (device->link_up && !up) {
         dcmp_health_count(&device->health.report.bus_offs);
-        dcmp_transmit_forget_answers(&device->transmit); /* nobody waits for them any more */
+        dcmp_transmit_forget_answers(&device->transmit); /* no host waits for them any more */
     }
     device->link_up = up;
     dcmp_guard_time(device, now_us);

@@ -1,4 +1,4 @@
-/* The complete device, for those that allocate one. Nobody but the core looks inside. */
+/* The complete device, for code that allocates one. Only the core accesses its members. */
 #ifndef DCMP_DEVICE_STATE_H
 #define DCMP_DEVICE_STATE_H
 

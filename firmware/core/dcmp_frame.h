@@ -1,4 +1,4 @@
-/* A classic CAN frame, whatever carries it. */
+/* A classic CAN frame, over any link. */
 #ifndef DCMP_FRAME_H
 #define DCMP_FRAME_H
 

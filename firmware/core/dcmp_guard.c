@@ -54,7 +54,7 @@ static void check_travel(struct dcmp_device *device)
         if (distance > limit || distance < -limit) {
             dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, distance);
         }
-        since_arming = device->parameters.built[DCMP_TRAVEL_LIMIT_COUNTS]; /* whatever a session calls its origin */
+        since_arming = device->parameters.built[DCMP_TRAVEL_LIMIT_COUNTS]; /* not from the session's origin */
     }
     if (dcmp_encoder_too_far(encoder, since_arming)) {
         dcmp_guard_raise(device, DCMP_EVENT_LIMIT, DCMP_OVER_TRAVEL, dcmp_encoder_travel(encoder));

@@ -15,7 +15,7 @@ void dcmp_guard_raise(struct dcmp_device *device, enum dcmp_event event, enum dc
 /* The owner is none any more, and its limits go with it. */
 void dcmp_guard_end_session(struct dcmp_device *device);
 
-/* Watchdog, link and lease: whatever time alone can bring about. */
+/* Watchdog, link and lease: the transitions that time alone causes. */
 void dcmp_guard_time(struct dcmp_device *device, uint32_t now_us);
 
 /* Speed, travel and jumps, as of the newest count. */

@@ -57,7 +57,7 @@ static size_t encode(const struct dcmp_port *port, const struct dcmp_frame *fram
     if (port->carrier == DCMP_CARRIER_COBS) {
         return dcmp_cobs_send(frame, out);
     }
-    return port->slcan.open ? dcmp_slcan_send(frame, out) : 0u; /* closed: said to nobody, not kept for later */
+    return port->slcan.open ? dcmp_slcan_send(frame, out) : 0u; /* closed: dropped, not kept for later */
 }
 
 size_t dcmp_port_transmit(const struct dcmp_port *port, struct dcmp_device *device, uint8_t *out, size_t room)

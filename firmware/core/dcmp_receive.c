@@ -64,7 +64,7 @@ static void receive_hello(struct dcmp_device *device, const struct dcmp_frame *f
         } else if (dcmp_session_owns(session, hello.session)) {
             dcmp_session_renew(session, now_us);
         } else {
-            /* somebody else's */
+            /* for another node */
         }
     }
     identity.owned = dcmp_session_owns(session, hello.session);

@@ -9,7 +9,7 @@ void dcmp_session_end(struct dcmp_session *session)
     session->step = 0;
 }
 
-/* Session 0 is nobody's, so it owns nothing even while nobody does. */
+/* Session 0 stands for no owner, so it never owns the device, even while no session does. */
 bool dcmp_session_owns(const struct dcmp_session *session, uint16_t candidate)
 {
     return candidate != 0u && candidate == session->owner;

@@ -14,7 +14,7 @@
 #define DCMP_TTL_MAX_MS 50u
 
 struct dcmp_session {
-    uint16_t owner;       /* 0: nobody */
+    uint16_t owner;       /* 0: no owner */
     uint32_t heard_us;    /* its last valid message */
     bool has_predecessor; /* an accepted DRIVE of this session */
     uint16_t seq;         /* of that one */

@@ -1,7 +1,7 @@
 /* What a device has to do, by docs/protocol.md: a second author's device, which the core is compared with frame by frame.
  * It knows what goes into the core and what comes out of it, and nothing of the inside.
  *
- * Whatever is new on the page is new in two places here: model.c (or motion.c, for the encoder), and the operations of
+ * A change of the page changes two places here: model.c (or motion.c, for the encoder), and the operations of
  * target.c that ask for it. */
 #ifndef FUZZ_MODEL_H
 #define FUZZ_MODEL_H

@@ -108,7 +108,7 @@ static struct motion_fault too_fast(const struct motion *motion, const struct mo
     return fault;
 }
 
-/* From the session's origin, and, whatever that is, from the first arming. */
+/* From the session's origin and, independently of it, from the first arming. */
 static struct motion_fault too_far(const struct motion *motion, const struct motion_limits *limits)
 {
     const bool given = limits->origin >= 0;

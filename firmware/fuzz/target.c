@@ -194,7 +194,7 @@ static const char *const lines[] = {
     "t80111", "t06011G", "t06011111", "c", "V1", "0123456789012345678901234567890", "01234567890123456789012345678901",
 };
 
-/* Bytes that nobody ordered into frames; a port that has none gets what ended as no frame. */
+/* Bytes without the order of frames; a port that has none gets what ended as no frame. */
 static void bytes(struct rig *rig, uint32_t how, struct input *input)
 {
     uint8_t piece[40];

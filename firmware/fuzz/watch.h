@@ -1,4 +1,4 @@
-/* What must hold whatever the model says: judged by what went in, what came out and the time, and by nothing else. */
+/* What must hold independently of the model: judged by input, output and time alone. */
 #ifndef FUZZ_WATCH_H
 #define FUZZ_WATCH_H
 

@@ -357,7 +357,7 @@ SCENARIOS: dict[str, Scenario] = {
     ),
     "travel-origin": Scenario("Travel from an origin that a session gave.", travel_origin),
     "travel-built": Scenario(
-        "Whatever the session's origin, the board's own limit counts from the first arming.",
+        "For any origin of the session, the board's own limit counts from the first arming.",
         travel_built,
         {"travel_limit_counts": 300},
     ),

@@ -14,7 +14,7 @@
 #define CODE_MAX 4095
 #define SUPPLY_MAX_MV 100000
 
-/* Of a board that nobody has told anything: weak, and in FAULT until somebody clears it. */
+/* Of a board without a record: weak, and in FAULT until a host clears it. */
 static const struct record unknown = {
     .counts_per_rev = 4096,
     .period_us = 1000,
@@ -84,7 +84,7 @@ struct settings settings_read(int32_t board, int32_t reset_cause, bool divides_s
     }
     struct record least = unknown;
     if (divides_supply) {
-        least.full_scale_mV = SUPPLY_MAX_MV; /* whatever the supply is, the voltage is at most what is asked for */
+        least.full_scale_mV = SUPPLY_MAX_MV; /* for any supply, the voltage is at most what is asked for */
     }
     struct settings weak = from_record(&least, board, reset_cause, divides_supply);
     weak.failure = found == NULL ? APP_NO_RECORD : APP_BAD_RECORD;

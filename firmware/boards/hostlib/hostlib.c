@@ -1,4 +1,4 @@
-/* The core as a shared library for one simulated board in somebody's process, with as few calls a period as possible.
+/* The core as a shared library for one simulated board in a host's process, with as few calls a period as possible.
  *
  * The caller owns the memory: hostlib_size() bytes, aligned like int64_t, the first of them a `struct hostlib_view`
  * that it may read at any time. What the device sends gathers behind the view; the caller takes `out_length` bytes from
@@ -78,7 +78,7 @@ static void settle(struct hostlib *board, struct dcmp_output output)
     struct hostlib_view *view = &board->view;
     view->out_length += (uint32_t)put(board, &board->out[view->out_length], OUT_BYTES - view->out_length);
     if (view->link_up == 0) {
-        view->out_length = 0; /* said to nobody */
+        view->out_length = 0; /* no link: dropped */
     }
     view->voltage_mV = output.voltage_mV;
     view->enable = output.enable;

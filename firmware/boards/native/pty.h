@@ -7,10 +7,10 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-/* Returns the master, non-blocking, its other end raw and open to nobody; -1 with errno set. */
+/* Returns the master, non-blocking, its other end raw and not open; -1 with errno set. */
 int pty_open(void);
 
-/* Whether somebody has the other end open. */
+/* Whether a process has the other end open. */
 bool pty_in_use(int master);
 
 /* Returns how many bytes were read, 0 if there are none, -1 if the other end has been closed. */
@@ -19,7 +19,7 @@ ssize_t pty_read(int master, uint8_t *bytes, size_t room);
 /* Never waits; returns how many bytes fitted. */
 size_t pty_write(int master, const uint8_t *bytes, size_t length);
 
-/* Forget what was written and not read, when nobody has the other end open. */
+/* Forget what was written and not read, when no process has the other end open. */
 void pty_flush(int master);
 
 #endif

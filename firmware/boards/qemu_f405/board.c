@@ -15,7 +15,7 @@
 
 #define BOARD_NUMBER 4
 #define BAUD 1000000u
-#define MS_OF_CLOCK 168000u /* the emulator's, whatever its registers say */
+#define MS_OF_CLOCK 168000u /* the emulator's, for any value of its registers */
 
 struct board {
     struct app app;

@@ -2,7 +2,7 @@
 #ifndef BOARD_H
 #define BOARD_H
 
-#define BOARD_TICK_IRQ 29u /* as on the bench board; here nobody but software asks for it */
+#define BOARD_TICK_IRQ 29u /* as on the bench board; here only software asks for it */
 
 void board_tick(void);
 void board_link(void);

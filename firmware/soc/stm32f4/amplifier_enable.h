@@ -1,4 +1,4 @@
-/* The ENABLE line, PB15: high lets the amplifier work, a resistor pulls it down when nobody drives it. */
+/* The ENABLE line, PB15: high lets the amplifier work, a resistor pulls it down when no pin drives it. */
 #ifndef AMPLIFIER_ENABLE_H
 #define AMPLIFIER_ENABLE_H
 

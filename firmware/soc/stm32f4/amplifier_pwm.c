@@ -33,12 +33,12 @@ void amplifier_start(const struct clock *clock, const struct amplifier_scale *sc
     (void)scale;
     clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
     clock_enable(&RCC->APB2ENR, RCC_APB2ENR_TIM1EN);
-    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER); /* first: a pin that nobody leads there is a break */
+    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER); /* first: a pin that is not connected is a break */
     pin_set_up(GPIOB, DIRECTION_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
     TIM1->ARR = clock->apb2_timers_Hz / FREQUENCY_HZ - 1u;
     TIM1->CCMR1 = (TIM_CCMR1_OC1M_PWM1 << TIM_CCMR1_OC1M_POS) | TIM_CCMR1_OC1PE;
     TIM1->CCER = TIM_CCER_CC1E;
-    /* Behind what it locks. No MOE: low until somebody arms. */
+    /* Behind what it locks. No MOE: low until the device is armed. */
     TIM1->BDTR = TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE | (LOCK_MOST << TIM_BDTR_LOCK_POS);
     TIM1->EGR = TIM_EGR_UG;
     TIM1->SR = 0;

@@ -74,7 +74,7 @@ bool bxcan_start(uint32_t bus_Hz, const uint16_t *ids, uint32_t count)
     let_in(ids, count);
     CAN1->MCR &= ~CAN_MCR_INRQ;
     CAN1->IER = CAN_IER_TMEIE | CAN_IER_FMPIE0 | CAN_IER_BOFIE | CAN_IER_ERRIE;
-    return true; /* it joins as soon as the bus is quiet for 11 bits, whether anybody waits for that or not */
+    return true; /* it joins as soon as the bus is quiet for 11 bits, whether a caller waits for that or not */
 }
 
 bool bxcan_receive(struct dcmp_frame *frame, bool *lost)

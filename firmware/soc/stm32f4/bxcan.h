@@ -16,7 +16,7 @@
  * controller does not answer. */
 bool bxcan_start(uint32_t bus_Hz, const uint16_t *ids, uint32_t count);
 
-/* The next frame; `lost` becomes true if there were some that nobody fetched in time. */
+/* The next frame; `lost` becomes true if frames were lost because they were not fetched in time. */
 bool bxcan_receive(struct dcmp_frame *frame, bool *lost);
 
 /* Whether a frame can be handed over now. */

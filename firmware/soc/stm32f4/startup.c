@@ -51,7 +51,7 @@ static void fill(uint32_t *from, size_t count, uint32_t value)
 _Noreturn void startup_reset(void)
 {
     board_hold();
-    SCB->VTOR = (uint32_t)&vectors; /* whoever started this may have had its own */
+    SCB->VTOR = (uint32_t)&vectors; /* the program that started this one may have had its own */
     fill(stack_start, words(stack_start, stack_end) - IN_USE, PAINT);
     fill(bss_start, words(bss_start, bss_end), 0u);
     board_main();
