@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dcmp_hil.api import run
     from dcmp_hil.backends import Backend
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig, load_rig
     from dcmp_hil.controllers import Controller, ControllerContext
     from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
     from dcmp_hil.model import Model
     from dcmp_hil.observers import Observer, ObserverContext
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.statistics import Summary
@@ -32,7 +32,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Backend": "dcmp_hil.backends",
     "BackendError": "dcmp_hil.errors",
-    "Clock": "dcmp_hil.clock",
+    "Clock": "dcmp_hil.platform.clock",
     "ConfigError": "dcmp_hil.errors",
     "Controller": "dcmp_hil.controllers",
     "ControllerContext": "dcmp_hil.controllers",

@@ -34,13 +34,13 @@ from dcmp_hil.trajectory import Trajectory
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
-    from dcmp_hil.endings import StopRequest
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
     from dcmp_hil.observers import Observer
+    from dcmp_hil.platform.clock import Clock
+    from dcmp_hil.platform.stop_request import StopRequest
     from dcmp_hil.plugins.roles import Role
     from dcmp_hil.stop import Check
     from dcmp_hil.telemetry.apart import Apart

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from dcmp_hil.backends import Backend
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.controllers import Controller
     from dcmp_hil.observers import Observer
+    from dcmp_hil.platform.clock import Clock
 
 _Stage = TypeVar("_Stage")
 _INJECT, _NEEDS_WIRE = "sim_backend.faults.plan:inject", "sim_backend.faults.plan:needs_wire"

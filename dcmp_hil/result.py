@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backends.goodbye import DeviceEnd
     from dcmp_hil.config import Rig
-    from dcmp_hil.realtime import Grant
+    from dcmp_hil.platform.realtime import Grant
     from dcmp_hil.safety.polarity_check import MotorGain
     from dcmp_hil.telemetry.statistics import Summary
     from dcmp_hil.values import Event

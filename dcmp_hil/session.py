@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
-from dcmp_hil.clock import MonotonicClock, SimulatedClock
-from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
 from dcmp_hil.fault_injection import inject
-from dcmp_hil.host import host_facts, in_words, require_linux
 from dcmp_hil.live.changes import LiveChanges
-from dcmp_hil.realtime import RealTime
+from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
+from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
+from dcmp_hil.platform.realtime import RealTime
+from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.result import Result
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.figures import Figures

@@ -16,8 +16,8 @@ from sim_backend.plant import make_plant
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from sim_backend.injection import PlantFaults
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
 
 _FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
 

@@ -20,8 +20,8 @@ from sim_backend.backend import SimBackend
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.telemetry.statistics import Summary
     from sim_backend.plant import Plant

@@ -22,9 +22,9 @@ from dcmp_hil.trajectory import Trajectory
 from tests.helpers import STEADY, bench, figures, known, named
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.observers import Observer
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Estimate, Reference, Sample
 
 

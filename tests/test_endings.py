@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from dcmp_hil.endings import StopRequest
+from dcmp_hil.platform.stop_request import StopRequest
 
 _ALL = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 

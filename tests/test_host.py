@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dcmp_hil import host
-from dcmp_hil.host import capabilities, host_facts, in_words, preemption, read_fact
+from dcmp_hil.platform import host_info
+from dcmp_hil.platform.host_info import capabilities, host_facts, in_words, preemption, read_fact
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_facts_are_unknown_when_the_kernel_tells_nothing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert read_fact(str(tmp_path / "nothing")) is None
-    monkeypatch.setattr(host, "read_fact", lambda _: None)
+    monkeypatch.setattr(host_info, "read_fact", lambda _: None)
     facts = host_facts()
     assert facts["governor"] is None
     assert facts["rt_runtime_us"] is None

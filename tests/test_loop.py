@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dcmp_hil import loop, run
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import TripError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.deadline_monitor import Overruns
 from dcmp_hil.safety.outlier_filter import Outliers
 from dcmp_hil.stop import Stop

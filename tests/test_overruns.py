@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DeadlineError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.deadline_monitor import Overruns
 from dcmp_hil.stop import Urgency
 from dcmp_hil.values import Timing
@@ -17,8 +17,8 @@ from sim_backend.backend import SimBackend
 from tests.helpers import HeldRun, T, bench
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
 
 _ON_TIME = Timing(T, 0.0, 20e-6)
 _LATE = Timing(1.6 * T, 0.6 * T, 20e-6)

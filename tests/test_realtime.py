@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from dcmp_hil import realtime
 from dcmp_hil.config.sections import TimingSection
 from dcmp_hil.errors import DeadlineError
-from dcmp_hil.realtime import RealTime
+from dcmp_hil.platform import realtime
+from dcmp_hil.platform.realtime import RealTime
 from dcmp_hil.session import Session
 from tests.helpers import bench
 

@@ -16,11 +16,11 @@ from unittest.mock import patch
 
 from dcmp_hil import load_rig, loop, run
 from dcmp_hil.assembly import assemble
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.observers import ObserverContext, super_twisting
 from dcmp_hil.observers.matched import copy_step, luenberger_copy
 from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Cycle, Sample
 from tools.bench_lateness import Lateness, lateness, period_us
 from tools.bench_telemetry import Endurance, endurance, record_us

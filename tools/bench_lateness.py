@@ -20,7 +20,7 @@ import numpy as np
 from dcmp_hil import load_rig, loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.session import Session
 from dcmp_hil.wire import cobs
 from sim_backend.backend import SimBackend
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
 _SPREAD = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged

@@ -15,7 +15,7 @@ import serial
 
 from dcmp_hil import load_rig
 from dcmp_hil.backends.serial_link import SerialLink
-from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import Drive, Parameter, ParameterGet, ParameterValue, SampleReport

@@ -25,8 +25,8 @@ from sim_backend.backend import SimBackend
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.values import Sample, Truth
     from sim_backend.plant import Plant

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.platform.clock import MonotonicClock
 from tests.faults.matrix import judge
 from tests.faults.null_plan import healthy
 from tests.faults.rows import ROWS

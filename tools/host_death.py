@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig
-from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from sim_backend.board.virtual_device import VirtualDevice
 from tools.cable import Cable

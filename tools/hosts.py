@@ -6,7 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.platform.clock import MonotonicClock, pause
 from dcmp_hil.wire.messages import State
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.platform.clock import MonotonicClock, pause
 from dcmp_hil.telemetry.viewer import (
     LOOPBACK,
     answers,

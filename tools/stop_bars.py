@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dcmp_hil import load_rig
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.places import mailbox_of, running
 from dcmp_hil.live.stopping import LIMIT, is_alive
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.recording.reader import read_run
 from sim_backend.board.virtual_device import VirtualDevice
 from tools.hosts import BOUND_S, wait

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from dcmp_hil.backends.kinds import KINDS
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked_backend import CheckedBackend
 from dcmp_hil.plugins.roles import BACKEND
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
     from dcmp_hil.fault_injection import Faults
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Sample, Truth
 
 

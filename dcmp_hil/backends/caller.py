@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.backends.link import Link
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 

@@ -19,8 +19,8 @@ from dcmp_hil.config.backends import Can as CanSettings
 from dcmp_hil.errors import ConfigError, DcmpError, LinkError, OpenError
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
 FAILURES = (

@@ -12,7 +12,7 @@ from dcmp_hil.wire.messages import Drive, State, StopReason
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
 
 _REPORT = 0.25  # s: FAULT comes every 100 ms
 _OTHER = 7  # fault class of every code from 7 on

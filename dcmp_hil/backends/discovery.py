@@ -22,7 +22,7 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
 
 LISTEN = 0.25  # s; a device sends every period, from boot on
 _TWINS = 1.0  # s, longer where ticks are odd

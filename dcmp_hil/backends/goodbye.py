@@ -10,7 +10,7 @@ from dcmp_hil.wire.messages import Drive, Health, State
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.messages import SampleReport
 
 _LEAST = 3  # answers at 0 V

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from dcmp_hil.backends.caller import Caller
     from dcmp_hil.backends.link import Link
     from dcmp_hil.backends.terms import Terms
-    from dcmp_hil.clock import Clock
     from dcmp_hil.errors import OpenError
+    from dcmp_hil.platform.clock import Clock
 
 _HELLOS, _TOLD = 5, 2
 _ROUND_TRIPS = 5

@@ -11,7 +11,7 @@ from dcmp_hil.wire.messages import SampleReport, State
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
 
 _OTHER_FAULT = 7  # fault_class that only says: see FAULT
 _PERIODS, _NEAR = 3, 8  # how long is listened; ticks that follow the newest one

@@ -10,7 +10,7 @@ from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
-    from dcmp_hil.clock import Clock
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.section import Section
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.backends.caller import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
-from dcmp_hil.host import contention
+from dcmp_hil.platform.host_info import contention
 from dcmp_hil.safety.device_faults import meaning_of, name_of
 from dcmp_hil.wire.messages import Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH

@@ -16,13 +16,13 @@ from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.failures import cannot_open, reason
 from dcmp_hil.config.backends import Serial as SerialSettings
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
-from dcmp_hil.forked import forget, keep_from_forks
+from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.carriers import has_samples
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
 FAILURES = (serial.SerialException, OSError, termios.error, ValueError, TypeError)

@@ -25,7 +25,7 @@ from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
 from dcmp_hil.cli.view import view
 from dcmp_hil.errors import DcmpError
-from dcmp_hil.host import require_linux
+from dcmp_hil.platform.host_info import require_linux
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.check import Check, Outcome
     from dcmp_hil.conformance.client import Client
-    from dcmp_hil.endings import StopRequest
+    from dcmp_hil.platform.stop_request import StopRequest
 
 WHAT_MOVES = (
     "With --arm the motor is switched on about 30 times, for 0.3 s each at most, mostly at up to 300 mV; "
@@ -123,9 +123,9 @@ class _Place:
 
     def open(self, stop: StopRequest) -> Client:
         """Open the port."""
-        from dcmp_hil.clock import MonotonicClock
         from dcmp_hil.conformance.client import Client
         from dcmp_hil.conformance.opening import open_line
+        from dcmp_hil.platform.clock import MonotonicClock
 
         clock = MonotonicClock()
         line = open_line(
@@ -173,7 +173,7 @@ def _run(
 ) -> int:
     from dcmp_hil.conformance.listener import StoppedError
     from dcmp_hil.conformance.runner import run_checks
-    from dcmp_hil.endings import StopRequest
+    from dcmp_hil.platform.stop_request import StopRequest
 
     outcomes: list[Outcome] = []
     ended_by, broken = "finished", None

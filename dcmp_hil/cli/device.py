@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.endings import StopRequest
+    from dcmp_hil.platform.stop_request import StopRequest
 
 _DEVICE = "sim_backend.board.virtual_device:VirtualDevice"
 _STATUS_S = 0.1  # between two looks at Ctrl-C, and two status lines
@@ -50,9 +50,9 @@ def device(
     The first line on standard output is the port, which a host opens as if it were a serial one. Ctrl-C
     ends it.
     """
-    from dcmp_hil.clock import MonotonicClock
     from dcmp_hil.config import load_rig
-    from dcmp_hil.endings import StopRequest
+    from dcmp_hil.platform.clock import MonotonicClock
+    from dcmp_hil.platform.stop_request import StopRequest
     from dcmp_hil.plugins import find_named
 
     loaded = load_rig(rig, overrides or ())

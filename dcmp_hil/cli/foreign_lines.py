@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import streams
-from dcmp_hil.process_log import STDERR, descriptor_of_stderr
+from dcmp_hil.platform.process_log import STDERR, descriptor_of_stderr
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,8 +13,8 @@ from dcmp_hil.backends.links import make_link
 from dcmp_hil.backends.tick_watch import TickWatch
 from dcmp_hil.cli import console
 from dcmp_hil.cli.streams import output_failed
-from dcmp_hil.clock import MonotonicClock
-from dcmp_hil.endings import StopRequest
+from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, FaultReport, Parameter, ParameterValue, SampleReport
 

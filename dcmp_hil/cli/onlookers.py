@@ -8,9 +8,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from dcmp_hil import process_log
 from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.status import StatusLine
+from dcmp_hil.platform import process_log
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -41,7 +41,7 @@ def ports(
     from rich.text import Text
 
     from dcmp_hil.backends.discovery import find_devices
-    from dcmp_hil.clock import MonotonicClock
+    from dcmp_hil.platform.clock import MonotonicClock
 
     found = 0
     for finding in find_devices(port or (), baud, bitrate, MonotonicClock(), wait, history=verbose):

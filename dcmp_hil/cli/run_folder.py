@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.cli import console
-from dcmp_hil.clock import utc_now
 from dcmp_hil.errors import ConfigError, TripError
+from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.whole_file import write_text
 
 if TYPE_CHECKING:

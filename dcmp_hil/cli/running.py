@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil import process_log
 from dcmp_hil.cli import console
 from dcmp_hil.cli.foreign_lines import split_stderr
 from dcmp_hil.cli.kept_recording import kept_in, space_warning
@@ -22,9 +21,10 @@ from dcmp_hil.cli.unattended import Unattended
 from dcmp_hil.cli.watching import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
-from dcmp_hil.endings import StopRequest
 from dcmp_hil.errors import DcmpError, IncompleteError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
+from dcmp_hil.platform import process_log
+from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.references.table import Table

@@ -6,8 +6,8 @@ from contextlib import suppress
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.watching import web_viewer
-from dcmp_hil.clock import pause
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import pause
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.display import display_problem
 

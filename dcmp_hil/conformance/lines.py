@@ -14,8 +14,8 @@ from dcmp_hil.errors import LinkError
 from dcmp_hil.wire import cobs, slcan
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config.backends import Can
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
 _CHUNK = 4096

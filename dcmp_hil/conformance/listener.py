@@ -21,8 +21,8 @@ from dcmp_hil.wire.messages import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.conformance.lines import Line
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 

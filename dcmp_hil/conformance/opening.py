@@ -14,8 +14,8 @@ from dcmp_hil.wire.codec import CorruptFrameError, unpack
 from dcmp_hil.wire.messages import SampleReport
 
 if TYPE_CHECKING:
-    from dcmp_hil.clock import Clock
     from dcmp_hil.conformance.lines import Line
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
 _LISTEN_S = 2.0  # a board that resets when its port is opened has booted by then

@@ -6,8 +6,8 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.controllers import Gains
-from dcmp_hil.endings import StopRequest
 from dcmp_hil.live.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
+from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 

@@ -15,8 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.clock import MonotonicClock
-from dcmp_hil.endings import SIGNALS, TAKEN
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.live.crowd import BETWEEN, PATIENCE, Crowd, listen
 from dcmp_hil.live.knobs import knobs
@@ -25,6 +23,8 @@ from dcmp_hil.live.places import peer_of, socket_of
 from dcmp_hil.live.settable import changed, doubts
 from dcmp_hil.live.state import state_of
 from dcmp_hil.live.stopping import stop_run
+from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.stop_request import SIGNALS, TAKEN
 from dcmp_hil.run_end import LIVES
 from dcmp_hil.telemetry.ring import Ring, capacity_of
 from dcmp_hil.telemetry.shared import mapped

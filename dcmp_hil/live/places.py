@@ -10,8 +10,8 @@ from pathlib import Path
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.mailbox import SIZE, Mailbox
+from dcmp_hil.platform.user_folder import private, temporary, usable
 from dcmp_hil.telemetry.shared import mapped
-from dcmp_hil.user_folder import private, temporary, usable
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 _LONGEST = 80  # characters: the path of a socket may have 107

@@ -12,8 +12,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.clock import MonotonicClock, pause
 from dcmp_hil.live.mailbox import STOP
+from dcmp_hil.platform.clock import MonotonicClock, pause
 from dcmp_hil.run_end import AT_ZERO, SAID
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import asyncio
 from http import HTTPStatus
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.panel.head import RequestError, head_of
+from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from aiohttp import web
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
 from dcmp_hil.live.stopping import End
@@ -24,6 +23,7 @@ from dcmp_hil.panel.guard import Guard
 from dcmp_hil.panel.head import BODY_BYTES
 from dcmp_hil.panel.quiet import quiet
 from dcmp_hil.panel.watcher import Watcher
+from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.endings import Interrupted
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.platform.stop_request import Interrupted
 from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
 from dcmp_hil.stop import Stop

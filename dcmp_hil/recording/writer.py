@@ -10,8 +10,8 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import CompressionType, Writer
 
-from dcmp_hil.clock import utc_now
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.chunk_indices import ChunkIndices
 from dcmp_hil.recording.layout import (

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     import socket

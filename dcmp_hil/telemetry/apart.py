@@ -18,11 +18,11 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.model import UNKNOWN_MODEL
-from dcmp_hil.process_log import terminal_copy
+from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
+from dcmp_hil.platform.process_log import terminal_copy
 from dcmp_hil.telemetry.answers import end_process, how_it_ended, receive, receive_from_working
 from dcmp_hil.telemetry.audience import Audience
 from dcmp_hil.telemetry.child import DONE, FIGURES, UP, Setup, State

@@ -17,9 +17,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil import process_log
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform import process_log
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry.answers import MESSAGE
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
 from dcmp_hil.telemetry.died import how_it_died

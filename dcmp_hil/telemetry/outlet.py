@@ -9,7 +9,7 @@ from contextlib import suppress
 from queue import Full, Queue
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import MonotonicClock
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry.room import room_for, size_of
 
 if TYPE_CHECKING:

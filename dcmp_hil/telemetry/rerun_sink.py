@@ -10,8 +10,8 @@ from uuid import uuid4
 
 import rerun as rr
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.beginning import begin, warm_up
 from dcmp_hil.telemetry.display import display_problem

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.explain import explain, numbers
 from dcmp_hil.config.rig import KINDS
-from dcmp_hil.host import host_facts
 from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.platform.host_info import host_facts
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from dcmp_hil import process_log
-from dcmp_hil.clock import MonotonicClock, pause
+from dcmp_hil.platform import process_log
+from dcmp_hil.platform.clock import MonotonicClock, pause
 from dcmp_hil.telemetry.tied import tied
 
 if TYPE_CHECKING:

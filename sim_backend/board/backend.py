@@ -15,8 +15,8 @@ from sim_backend.pacer import Pacer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Truth
     from dcmp_hil.wire.frame import Frame
 

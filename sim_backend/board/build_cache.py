@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import OpenError
-from dcmp_hil.user_folder import private, temporary
+from dcmp_hil.platform.user_folder import private, temporary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

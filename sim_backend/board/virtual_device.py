@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import TracebackType
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Truth
 
 _LIVE = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE

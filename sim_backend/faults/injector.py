@@ -20,8 +20,8 @@ from sim_backend.faults.wire import WireFault
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.clock import Clock
     from dcmp_hil.config import Rig
+    from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Estimate, Sample, Truth
     from sim_backend.encoder import Encoder
     from sim_backend.faults.base import FaultModel, RigFacts

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig, loop
 from dcmp_hil.assembly import assemble
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.speed_resolution import resolution
 from tests.attacks.hostile.wrong_observers import KINDS
 

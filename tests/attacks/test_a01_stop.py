@@ -23,13 +23,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends.serial_link import open_port
-from dcmp_hil.clock import MonotonicClock
-from dcmp_hil.endings import Interrupted, StopRequest
-from dcmp_hil.forked import forget, keep_from_forks
 from dcmp_hil.live import places, stopping
 from dcmp_hil.live.control import Server, Setup
 from dcmp_hil.live.mailbox import SIZE, STOP, Mailbox
 from dcmp_hil.live.stopping import End, stop_run
+from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
+from dcmp_hil.platform.stop_request import Interrupted, StopRequest
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED
 from dcmp_hil.telemetry.died import how_it_died

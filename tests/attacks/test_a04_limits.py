@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.monitors import Ranges
 from dcmp_hil.values import Estimate, Sample
 from dcmp_hil.wire.codec import pack, unpack

@@ -16,8 +16,8 @@ import pytest
 from dcmp_hil.backends.device import DeviceBackend
 from dcmp_hil.backends.history import History
 from dcmp_hil.backends.serial_link import SerialLink
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import OpenError
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.session import Session
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.codec import pack

@@ -16,8 +16,8 @@ import pytest
 from dcmp_hil import load_rig
 from dcmp_hil.backends import refusals
 from dcmp_hil.errors import ConfigError, OpenError
-from dcmp_hil.host import contention
 from dcmp_hil.live.settable import changed
+from dcmp_hil.platform.host_info import contention
 from sim_backend.board import build, build_cache
 
 if TYPE_CHECKING:

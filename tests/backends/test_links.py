@@ -12,9 +12,9 @@ import serial
 
 from dcmp_hil.backends.can_link import CanLink
 from dcmp_hil.backends.serial_link import SerialLink
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
 from dcmp_hil.errors import ConfigError, DcmpError, OpenError
+from dcmp_hil.platform.clock import MonotonicClock
 from tests.backends.line import line
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import can
 import pytest
 
 from dcmp_hil.backends.can_link import CanLink
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
 from dcmp_hil.errors import LinkError, OpenError
+from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

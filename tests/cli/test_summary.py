@@ -9,7 +9,7 @@ from rich.console import Console
 from dcmp_hil import run
 from dcmp_hil.cli.status import StatusLine
 from dcmp_hil.cli.summary import summary_table
-from dcmp_hil.realtime import Grant
+from dcmp_hil.platform.realtime import Grant
 from dcmp_hil.telemetry.statistics import Histogram
 from tests.helpers import bench
 from tests.telemetry.runs import T, blocks

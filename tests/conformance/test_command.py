@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.conformance.check import Verdict
 from dcmp_hil.conformance.client import Client
 from dcmp_hil.conformance.opening import open_line
 from dcmp_hil.conformance.registry import CHECKS
 from dcmp_hil.conformance.runner import run_checks
+from dcmp_hil.platform.clock import MonotonicClock
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.conformance.seeded import SEEDS
 from tests.contract.pump import PtyPort, Pump, VirtualBus

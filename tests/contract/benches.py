@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.backends import open_backend
 from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.clock import MonotonicClock, SimulatedClock
+from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump, VirtualBus

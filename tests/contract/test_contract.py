@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError, LinkError, OpenError, SampleTimeoutError, TripError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import protocol_hash
 from dcmp_hil.wire.codec import pack

@@ -142,7 +142,7 @@ def test_what_was_handed_over_is_in_the_file_but_for_30_ms(tmp_path: Path) -> No
 _WRITES = """
 import sys
 from pathlib import Path
-from dcmp_hil.clock import pause
+from dcmp_hil.platform.clock import pause
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.telemetry.audience import Audience, Service

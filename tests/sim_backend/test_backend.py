@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import LinkError
+from dcmp_hil.platform.clock import SimulatedClock
 from sim_backend.backend import SimBackend
 from tests.helpers import bench
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack, unpack

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends import open_backend
-from dcmp_hil.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
+from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack, unpack

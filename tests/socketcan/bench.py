@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Self
 
 from dcmp_hil import load_rig
 from dcmp_hil.backends.can_link import open_can
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config.backends import Can
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.socketcan.hosts import Host

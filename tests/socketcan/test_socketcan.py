@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends.can_link import CanLink
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.errors import LinkError, OpenError
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from tests.socketcan.bench import SHORT, WATCHDOG_MS, Bench, drive, drive_into

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from unittest.mock import patch
 
 from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop

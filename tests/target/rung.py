@@ -6,8 +6,8 @@ import math
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.config import change_rig
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import ParameterGet, ParameterValue, SampleReport, State

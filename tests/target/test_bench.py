@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends import open_backend
-from dcmp_hil.clock import SimulatedClock
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire.messages import Parameter
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board

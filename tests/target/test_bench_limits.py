@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.clock import SimulatedClock
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Parameter
 from sim_backend.board.backend import SimBoardBackend

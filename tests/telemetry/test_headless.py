@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from dcmp_hil.clock import pause
+from dcmp_hil.platform.clock import pause
 from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.rerun_sink import RerunSink

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from dcmp_hil.clock import MonotonicClock
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.audience import Audience

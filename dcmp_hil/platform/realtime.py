@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 from dcmp_hil.errors import DeadlineError
-from dcmp_hil.host import privileges
+from dcmp_hil.platform.host_info import privileges
 
 if TYPE_CHECKING:
     from collections.abc import Callable
