@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.live.changes import NoChanges
 from dcmp_hil.values import Cycle, Timing
 

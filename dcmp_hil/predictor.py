@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:

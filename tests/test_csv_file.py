@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.csv_file import read_columns
+from dcmp_hil.common.csv import read_columns
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:

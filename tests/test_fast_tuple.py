@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.values import Estimate, Sample
 
 

@@ -12,8 +12,8 @@ from dcmp_hil.backends.handshake import Handshake
 from dcmp_hil.backends.left_run import another_runs, why_left
 from dcmp_hil.backends.link_meter import LinkMeter
 from dcmp_hil.backends.terms import Terms
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.errors import BackendError, LinkError, TripError
-from dcmp_hil.fast_tuple import make
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.counters import nearest

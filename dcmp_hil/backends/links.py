@@ -10,8 +10,8 @@ from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
     from dcmp_hil.backends.link import Link
+    from dcmp_hil.common.section import Section
     from dcmp_hil.platform.clock import Clock
-    from dcmp_hil.section import Section
 
 
 def make_link(settings: Section, clock: Clock) -> Link:

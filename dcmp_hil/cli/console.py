@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
+from dcmp_hil.common.atomic_file import write_text
+from dcmp_hil.common.printable_text import printable
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.typed_text import printable
-from dcmp_hil.whole_file import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

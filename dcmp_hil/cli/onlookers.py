@@ -48,7 +48,7 @@ def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> 
 
 def dashboard_replacing(view: RigView, record: Path, viewer: Viewer, port: int) -> Sink:
     """Return a dashboard whose recording takes the place of what is at `record` with the first period."""
-    from dcmp_hil.whole_file import place_beside
+    from dcmp_hil.common.atomic_file import place_beside
 
     beside = place_beside(record)
     if beside is None:

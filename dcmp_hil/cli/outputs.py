@@ -7,8 +7,8 @@ import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.atomic_file import is_special, real
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.whole_file import is_special, real
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

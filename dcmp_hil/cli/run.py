@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from dcmp_hil.cli.options import Force, JsonFile, Overrides, RigName
-from dcmp_hil.typed_text import readable
+from dcmp_hil.common.printable_text import readable
 
 
 class Viewer(StrEnum):

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.cli import console
+from dcmp_hil.common.atomic_file import write_text
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.platform.clock import utc_now
-from dcmp_hil.whole_file import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -52,9 +52,9 @@ class Unattended:
             The same, for people.
         """
         from dcmp_hil.cli.run_document import run_document, write_json
+        from dcmp_hil.common.atomic_file import write_text
         from dcmp_hil.platform.host_info import host_facts
         from dcmp_hil.result import Result
-        from dcmp_hil.whole_file import write_text
 
         result = Result(
             rig=self.rig,

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
+from dcmp_hil.common.section import Section
 from dcmp_hil.config.sections import Custom
-from dcmp_hil.section import Section
 
 _PAIR_COBS = 2 * 14 * 10  # bits of a DRIVE and a SAMPLE on the wire, start and stop bits included
 _PAIR_SLCAN = 2 * 22 * 10

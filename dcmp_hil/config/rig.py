@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
+from dcmp_hil.common.section import Section
 from dcmp_hil.config.backends import Can, CustomBackend, Serial, Sim, SimBoard
 from dcmp_hil.config.rules import RULES
 from dcmp_hil.config.sections import (
@@ -28,7 +29,6 @@ from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.references.periodic import Chirp, Sine
 from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
 from dcmp_hil.references.table import Table
-from dcmp_hil.section import Section
 
 if TYPE_CHECKING:
     from dcmp_hil.model import Model

@@ -14,8 +14,8 @@ from dcmp_hil.safety.speed_resolution import lowest_limit
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from dcmp_hil.common.section import Section
     from dcmp_hil.config.rig import Rig
-    from dcmp_hil.section import Section
 
 _COARSEST_ENCODER = 256  # counts a revolution
 _LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s

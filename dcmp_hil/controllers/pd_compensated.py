@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+from dcmp_hil.common.section import NotNegative, Section
 from dcmp_hil.controllers import Gains
-from dcmp_hil.section import NotNegative, Section
 
 if TYPE_CHECKING:
     from dcmp_hil.controllers import ControllerContext

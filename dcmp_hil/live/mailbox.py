@@ -7,9 +7,9 @@ import struct
 import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.common.printable_text import readable
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.run_end import FORCED, SAID, UNCONFIRMED, WORD
-from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
     import mmap

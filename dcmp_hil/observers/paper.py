@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal
 
+from dcmp_hil.common.section import Positive, Section
 from dcmp_hil.observers import standing_still
-from dcmp_hil.section import Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.common.section import NotNegative, Positive, Section
 from dcmp_hil.observers import standing_still
 from dcmp_hil.observers.matched import Gains, copy_step, luenberger_copy, matched_gains
-from dcmp_hil.section import NotNegative, Positive, Section
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.drawing import files_only
+from dcmp_hil.common.atomic_file import whole_file
+from dcmp_hil.common.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.paper.panels import FIGURES, Panel, series
-from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
-from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

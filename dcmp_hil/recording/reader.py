@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from dcmp_hil.common.printable_text import readable
 from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.format_1 import event_of_format_1
@@ -20,7 +21,6 @@ from dcmp_hil.recording.records import Op, RecordError, counts_in, metadata_in
 from dcmp_hil.recording.scanner import Damage, Scanner, attachment_of
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.signals import columns
-from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -4,7 +4,7 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from dcmp_hil.section import Section
+from dcmp_hil.common.section import Section
 from dcmp_hil.values import Reference
 
 

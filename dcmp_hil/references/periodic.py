@@ -3,9 +3,9 @@
 import math
 from typing import Literal
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.common.section import NotNegative, Positive
 from dcmp_hil.references import ReferenceSettings
-from dcmp_hil.section import NotNegative, Positive
 from dcmp_hil.values import Reference
 
 

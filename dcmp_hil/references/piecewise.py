@@ -3,8 +3,8 @@
 import math
 from typing import Literal
 
+from dcmp_hil.common.section import NotNegative, Positive
 from dcmp_hil.references import ReferenceSettings
-from dcmp_hil.section import NotNegative, Positive
 from dcmp_hil.values import Reference
 
 

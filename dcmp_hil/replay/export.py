@@ -6,8 +6,8 @@ import csv
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.drawing import files_only
+from dcmp_hil.common.atomic_file import whole_file
+from dcmp_hil.common.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
 from dcmp_hil.telemetry.titles import title
-from dcmp_hil.whole_file import whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fastcrc import crc8
 
-from dcmp_hil.fast_tuple import make
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.wire import messages
 from dcmp_hil.wire.messages import Drive, Edge, Identity, SampleReport
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil import load_rig
+from dcmp_hil.common.printable_text import printable
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.typed_text import printable
 from tests.attacks.hostile.recordings import ESCAPE, recordings
 from tests.installed import environment
 

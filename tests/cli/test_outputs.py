@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.cli.outputs import try_folder, try_places
+from dcmp_hil.common.atomic_file import write_text
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.whole_file import write_text
 from tests.installed import Finished, environment
 
 if TYPE_CHECKING:

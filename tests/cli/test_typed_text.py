@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.printable_text import readable
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.typed_text import readable
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,0 +1,1 @@
+"""What every room may use: the base of rig.toml's tables, CSV, text, files, tuples, pictures."""
