@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dcmp_hil.api import run
     from dcmp_hil.backends import Backend
     from dcmp_hil.config import Rig, load_rig
-    from dcmp_hil.controllers import Controller, ControllerContext
+    from dcmp_hil.control.controllers import Controller, ControllerContext
+    from dcmp_hil.control.model import Model
+    from dcmp_hil.control.observers import Observer, ObserverContext
     from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
-    from dcmp_hil.model import Model
-    from dcmp_hil.observers import Observer, ObserverContext
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.telemetry.recorder import Sink
@@ -34,17 +34,17 @@ _HOMES = {
     "BackendError": "dcmp_hil.errors",
     "Clock": "dcmp_hil.platform.clock",
     "ConfigError": "dcmp_hil.errors",
-    "Controller": "dcmp_hil.controllers",
-    "ControllerContext": "dcmp_hil.controllers",
+    "Controller": "dcmp_hil.control.controllers",
+    "ControllerContext": "dcmp_hil.control.controllers",
     "Cycle": "dcmp_hil.values",
     "DcmpError": "dcmp_hil.errors",
     "DeadlineError": "dcmp_hil.errors",
     "Estimate": "dcmp_hil.values",
     "Event": "dcmp_hil.values",
     "Fault": "dcmp_hil.values",
-    "Model": "dcmp_hil.model",
-    "Observer": "dcmp_hil.observers",
-    "ObserverContext": "dcmp_hil.observers",
+    "Model": "dcmp_hil.control.model",
+    "Observer": "dcmp_hil.control.observers",
+    "ObserverContext": "dcmp_hil.control.observers",
     "Reference": "dcmp_hil.values",
     "Result": "dcmp_hil.result",
     "Rig": "dcmp_hil.config",

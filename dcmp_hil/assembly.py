@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from dcmp_hil import controllers, observers
 from dcmp_hil.backends import open_backend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
-from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.control import controllers, observers
+from dcmp_hil.control.controllers.pd_compensated import PdSettings
+from dcmp_hil.control.observers.known_friction import KnownFriction
+from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
+from dcmp_hil.control.predictor import Predictor
+from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
-from dcmp_hil.observers.known_friction import KnownFriction
-from dcmp_hil.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
-from dcmp_hil.predictor import Predictor
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import Overruns
 from dcmp_hil.safety.limits import Limits
@@ -29,16 +30,15 @@ from dcmp_hil.safety.speed_resolution import resolution
 from dcmp_hil.safety.supervisor import Supervisor
 from dcmp_hil.telemetry.block import Aligner
 from dcmp_hil.telemetry.recorder import Recorder
-from dcmp_hil.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.controllers import Controller
+    from dcmp_hil.control.controllers import Controller
+    from dcmp_hil.control.observers import Observer
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.mailbox import Mailbox
-    from dcmp_hil.observers import Observer
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest
     from dcmp_hil.plugins.roles import Role

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backends import Backend
     from dcmp_hil.config import Rig
-    from dcmp_hil.controllers import Controller
-    from dcmp_hil.observers import Observer
+    from dcmp_hil.control.controllers import Controller
+    from dcmp_hil.control.observers import Observer
     from dcmp_hil.platform.clock import Clock
 
 _Stage = TypeVar("_Stage")

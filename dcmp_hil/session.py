@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
+from dcmp_hil.control.trajectory import LOWERING
 from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
 from dcmp_hil.fault_injection import inject
 from dcmp_hil.live.changes import LiveChanges
@@ -23,7 +24,6 @@ from dcmp_hil.telemetry.figures import Figures
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.makers import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.trajectory import LOWERING
 from dcmp_hil.values import CauseData, Event, EventKind
 
 if TYPE_CHECKING:

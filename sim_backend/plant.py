@@ -9,7 +9,7 @@ from dcmp_hil.values import Truth
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
 
 
 class Plant(Protocol):

@@ -10,9 +10,9 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.model import Model
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.model import Model
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.session import Session
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing, Truth
 from sim_backend.backend import SimBackend

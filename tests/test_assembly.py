@@ -9,21 +9,21 @@ import pytest
 
 from dcmp_hil import run
 from dcmp_hil.assembly import make_controller, make_observer
-from dcmp_hil.controllers import ControllerContext
+from dcmp_hil.control.controllers import ControllerContext
+from dcmp_hil.control.model import Model
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.known_friction import KnownFriction
+from dcmp_hil.control.observers.paper import PaperObserver
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.references.periodic import Sine
+from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.model import Model
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.known_friction import KnownFriction
-from dcmp_hil.observers.paper import PaperObserver
-from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
-from dcmp_hil.references.periodic import Sine
-from dcmp_hil.trajectory import Trajectory
 from tests.helpers import STEADY, bench, figures, known, named
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.observers import Observer
+    from dcmp_hil.control.observers import Observer
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Estimate, Reference, Sample
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dcmp_hil.references.periodic import Sine
+from dcmp_hil.control.references.periodic import Sine
 from dcmp_hil.safety.governor import Bounds, Governor
 from dcmp_hil.values import Reference
 

@@ -10,12 +10,12 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.assembly import make_observer
+from dcmp_hil.control.references.periodic import Sine
+from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named, make_named
 from dcmp_hil.plugins.roles import BACKEND, CONTROLLER, OBSERVER, Role
 from dcmp_hil.plugins.source import look_at
-from dcmp_hil.references.periodic import Sine
-from dcmp_hil.trajectory import Trajectory
 from dcmp_hil.values import Sample
 
 if TYPE_CHECKING:
@@ -291,9 +291,9 @@ def test_look_finds_a_class_that_could_not_be_made(tmp_path: Path, module: str, 
     "text",
     [
         OBSERVER_TEXT,
-        "from dcmp_hil.observers.super_twisting import SuperTwisting\nclass Obs(SuperTwisting): pass",
-        "from dcmp_hil.observers.super_twisting import SuperTwisting as Obs",
-        "from dcmp_hil.observers.super_twisting import *",
+        "from dcmp_hil.control.observers.super_twisting import SuperTwisting\nclass Obs(SuperTwisting): pass",
+        "from dcmp_hil.control.observers.super_twisting import SuperTwisting as Obs",
+        "from dcmp_hil.control.observers.super_twisting import *",
         "if 1:\n  class Obs:\n    def update(self, s): ...",
         "try:\n  import x\nexcept ImportError:\n  class Obs:\n    def update(self, s): ...",
         "def Obs(context, **options): ...",

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from dcmp_hil.model import Model
-from dcmp_hil.predictor import Predictor, held_input
+from dcmp_hil.control.model import Model
+from dcmp_hil.control.predictor import Predictor, held_input
 from dcmp_hil.values import Estimate, Sample
 
 _SAMPLE = Sample(1.0, 0.31, 0.0)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.references.periodic import Sine
-from dcmp_hil.trajectory import LOWERING, Trajectory
+from dcmp_hil.control.references.periodic import Sine
+from dcmp_hil.control.trajectory import LOWERING, Trajectory
 from dcmp_hil.values import Reference
 from tests.helpers import figures, known
 

@@ -16,10 +16,10 @@ from unittest.mock import patch
 
 from dcmp_hil import load_rig, loop, run
 from dcmp_hil.assembly import assemble
-from dcmp_hil.observers import ObserverContext, super_twisting
-from dcmp_hil.observers.matched import copy_step, luenberger_copy
-from dcmp_hil.observers.paper import PaperObserver
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.observers import ObserverContext, super_twisting
+from dcmp_hil.control.observers.matched import copy_step, luenberger_copy
+from dcmp_hil.control.observers.paper import PaperObserver
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Cycle, Sample
 from tools.bench_lateness import Lateness, lateness, period_us
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.observers import Observer
-    from dcmp_hil.observers.matched import Copy
+    from dcmp_hil.control.observers import Observer
+    from dcmp_hil.control.observers.matched import Copy
 
 _ROUNDS = 7
 

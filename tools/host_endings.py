@@ -62,7 +62,7 @@ class Controller(_Raises):
 
 class Observer(_Raises):
     def __init__(self, setting, what="ValueError"):
-        from dcmp_hil.observers.super_twisting import SuperTwisting
+        from dcmp_hil.control.observers.super_twisting import SuperTwisting
         super().__init__(setting, what)
         self._real = SuperTwisting(setting)
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.config import load_rig, load_table
 from dcmp_hil.config.sections import Custom
+from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.observers.paper import PaperSettings
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.replay import ColumnOptions, ReplaySettings
 
 if TYPE_CHECKING:

@@ -21,13 +21,13 @@ from dcmp_hil.cli.unattended import Unattended
 from dcmp_hil.cli.watching import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
+from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import DcmpError, IncompleteError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
-from dcmp_hil.references.table import Table
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.room import room_for

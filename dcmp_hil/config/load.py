@@ -15,8 +15,8 @@ from dcmp_hil.config.overrides import apply_overrides
 from dcmp_hil.config.rig import Rig
 from dcmp_hil.config.text import name_from, parse
 from dcmp_hil.config.words import printable, toml_value
+from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.references.table import Table
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

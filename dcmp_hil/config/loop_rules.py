@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.config.words import number
-from dcmp_hil.controllers.pd_compensated import PdSettings
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.paper import PaperSettings
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.control.controllers.pd_compensated import PdSettings
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.control.stability import LinearLoop, LoopSpec, bandwidths
 from dcmp_hil.safety.chatter import FLOOR_V_S
-from dcmp_hil.stability import LinearLoop, LoopSpec, bandwidths
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.references.periodic import Chirp, Sine
-from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
+from dcmp_hil.control.references.periodic import Chirp, Sine
+from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

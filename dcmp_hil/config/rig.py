@@ -23,15 +23,15 @@ from dcmp_hil.config.sections import (
     SupervisorSection,
     TimingSection,
 )
-from dcmp_hil.controllers.pd_compensated import PdSettings
-from dcmp_hil.observers.paper import PaperSettings
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.references.periodic import Chirp, Sine
-from dcmp_hil.references.piecewise import Hold, Step, Trapezoid
-from dcmp_hil.references.table import Table
+from dcmp_hil.control.controllers.pd_compensated import PdSettings
+from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.control.references.periodic import Chirp, Sine
+from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
+from dcmp_hil.control.references.table import Table
 
 if TYPE_CHECKING:
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
 
 _OF_ALL, _OF_SPARE, _OF_MOTOR = 0.85, 0.7, 0.25  # of all the motor has; of what is left; at least, of all
 _COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there

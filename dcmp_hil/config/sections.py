@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dcmp_hil.common.section import Section
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 
 _SHORT_OF = 0.95  # of a limit that trips: room for the arm to overshoot a reference that stops there
 

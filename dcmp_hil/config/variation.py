@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.loop_rules import loops
-from dcmp_hil.controllers.pd_compensated import PdSettings
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.control.controllers.pd_compensated import PdSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 
 if TYPE_CHECKING:
     from dcmp_hil.config.rig import Rig

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.controllers import Gains
-    from dcmp_hil.observers.super_twisting import Tuning
-    from dcmp_hil.references import ReferenceSource
+    from dcmp_hil.control.controllers import Gains
+    from dcmp_hil.control.observers.super_twisting import Tuning
+    from dcmp_hil.control.references import ReferenceSource
 
 
 class Change(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
-from dcmp_hil.controllers import Gains
+from dcmp_hil.control.controllers import Gains
 from dcmp_hil.live.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase
@@ -14,13 +14,13 @@ from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.controllers import Controller
+    from dcmp_hil.control.controllers import Controller
+    from dcmp_hil.control.observers import Observer
+    from dcmp_hil.control.observers.super_twisting import Tuning
+    from dcmp_hil.control.trajectory import Trajectory
     from dcmp_hil.live.change import Change
     from dcmp_hil.live.mailbox import Mailbox
-    from dcmp_hil.observers import Observer
-    from dcmp_hil.observers.super_twisting import Tuning
     from dcmp_hil.safety.chatter import Chatter
-    from dcmp_hil.trajectory import Trajectory
 
 RAMP = 0.25  # s, over which gains go from old to new
 _PLACES = {phase.value: place for place, phase in enumerate(Phase)}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil import observers
 from dcmp_hil.config import change_rig
 from dcmp_hil.config.explain import by_rule, warnings
 from dcmp_hil.config.loop_rules import holds
@@ -12,11 +11,12 @@ from dcmp_hil.config.reach import beyond_reach
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.config.words import toml_value
-from dcmp_hil.controllers.pd_compensated import PdSettings
+from dcmp_hil.control import observers
+from dcmp_hil.control.controllers.pd_compensated import PdSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.change import Change
-from dcmp_hil.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.references.table import Table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

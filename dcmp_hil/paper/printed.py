@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.controllers.pd_compensated import PdCompensated
-from dcmp_hil.observers.paper import PaperObserver
+from dcmp_hil.control.controllers.pd_compensated import PdCompensated
+from dcmp_hil.control.observers.paper import PaperObserver
 
 if TYPE_CHECKING:
-    from dcmp_hil.controllers import ControllerContext
+    from dcmp_hil.control.controllers import ControllerContext
     from dcmp_hil.values import Estimate, Reference
 
 

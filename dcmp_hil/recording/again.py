@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.control.predictor import Predictor
+from dcmp_hil.control.references.table import Table
+from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.live.mailbox import Mailbox
 from dcmp_hil.plugins.checked import failure_of
-from dcmp_hil.predictor import Predictor
 from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.recording.foreign import UnreadTable, check_numbers, refuse_named
-from dcmp_hil.references.table import Table
 from dcmp_hil.telemetry.ring import FIELDS
-from dcmp_hil.trajectory import Trajectory
 from dcmp_hil.values import EventKind, Reference, Sample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.control.references import ReferenceSource
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.references import ReferenceSource
     from dcmp_hil.values import Estimate, Event
 
 _AT = {name: place for place, name in enumerate(FIELDS)}

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.control.references.table import Table
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.references.table import Table
     from dcmp_hil.values import Reference
 
 _T, _FAULT = FIELDS.index("t"), FIELDS.index("fault")

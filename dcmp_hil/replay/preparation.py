@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.control.model import Model
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.paper import PaperObserver
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.model import Model
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.paper import PaperObserver
-from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked import CheckedObserver
 from dcmp_hil.plugins.roles import OBSERVER
@@ -21,7 +21,7 @@ from dcmp_hil.replay.settings import IDEAL, ReplaySettings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.observers import Observer
+    from dcmp_hil.control.observers import Observer
     from dcmp_hil.replay.recording import Recording
 
 _SHORTEST = 1e-6  # s: a shorter period is a wrong unit

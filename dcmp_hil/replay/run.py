@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
 from dcmp_hil.replay.plausibility import check_assumed, check_estimates, check_motion
@@ -20,7 +20,7 @@ from dcmp_hil.values import Estimate, Sample
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.observers import Observer
+    from dcmp_hil.control.observers import Observer
     from dcmp_hil.replay.recording import Recording
 
 _LONGEST_GAP = 10.02  # periods: the observers restart after a longer one

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.model import Model
 
 InputKind = Literal["torque", "voltage", "none"]
 _PAPER = Model()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.observers import ObserverContext
+    from dcmp_hil.control.observers import ObserverContext
     from dcmp_hil.values import Sample
 
     Vector = NDArray[np.float64]

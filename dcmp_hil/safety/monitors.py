@@ -15,7 +15,7 @@ from dcmp_hil.values import Fault
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from dcmp_hil.observers import Observer, ObserverContext
+    from dcmp_hil.control.observers import Observer, ObserverContext
     from dcmp_hil.values import Estimate, Sample
 
 _HEALTHY = Fault.NONE  # found here faster than in its class

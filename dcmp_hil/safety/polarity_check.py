@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.values import Sample
 
 WATCH = 0.1  # s at 0 V: is the arm at rest

@@ -18,8 +18,8 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.model import UNKNOWN_MODEL
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
@@ -34,7 +34,7 @@ from dcmp_hil.values import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.telemetry.statistics import Statistics
 
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost

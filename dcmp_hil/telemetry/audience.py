@@ -6,14 +6,14 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.telemetry.ring import Ring
 
 INTERVAL = 0.1  # s between two blocks in real time

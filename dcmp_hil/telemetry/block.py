@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.ring import FIELDS, NOWHERE
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.values import Reference
 
 _COLUMN = {name: index for index, name in enumerate(FIELDS)}

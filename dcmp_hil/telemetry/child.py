@@ -31,7 +31,7 @@ from dcmp_hil.telemetry.shared import Ledger, mapped
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.statistics import Statistics
 

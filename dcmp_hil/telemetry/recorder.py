@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
-from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.telemetry.audience import Audience, Service, Sink
 from dcmp_hil.telemetry.link import LinkWatch
 from dcmp_hil.telemetry.ring import Ring
@@ -13,7 +13,7 @@ from dcmp_hil.telemetry.ring import Ring
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.block import Aligner
     from dcmp_hil.values import Cycle, Event, Truth

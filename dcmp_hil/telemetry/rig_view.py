@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.explain import explain, numbers
 from dcmp_hil.config.rig import KINDS
-from dcmp_hil.model import UNKNOWN_MODEL
+from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.platform.host_info import host_facts
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
 
 
 @dataclass(frozen=True, slots=True)

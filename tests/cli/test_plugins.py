@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     Script = Callable[..., Finished]
 
 OBSERVER = """
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 
 class Obs(SuperTwisting):
     pass

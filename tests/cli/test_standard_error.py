@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _NOISE = """
 import logging, os, warnings
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 
 class Noisy(SuperTwisting):
     def __init__(self, setting):

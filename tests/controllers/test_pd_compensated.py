@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.controllers import ControllerContext
-from dcmp_hil.controllers.pd_compensated import PdCompensated, PdSettings
-from dcmp_hil.model import Model
+from dcmp_hil.control.controllers import ControllerContext
+from dcmp_hil.control.controllers.pd_compensated import PdCompensated, PdSettings
+from dcmp_hil.control.model import Model
 from dcmp_hil.values import Estimate, Reference
 
 _SETTING = ControllerContext(Model(), 1e-3)

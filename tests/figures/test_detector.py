@@ -8,7 +8,7 @@ from statistics import median
 import pytest
 
 from dcmp_hil import run
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.safety.monitors import DisturbanceWatch
 from dcmp_hil.values import Estimate, Sample
 from tests import helpers

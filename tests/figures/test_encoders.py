@@ -9,8 +9,8 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.config.explain import warnings
+from dcmp_hil.control.observers.super_twisting import bandwidth_floor, watch_floor
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.observers.super_twisting import bandwidth_floor, watch_floor
 from tests import helpers
 from tests.figures.detection import detect
 from tools.encoders import healthy

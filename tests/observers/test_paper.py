@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.observers.paper import PaperObserver
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T, setting, spoilt
 

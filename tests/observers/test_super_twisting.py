@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dcmp_hil.control.observers.super_twisting import SuperTwisting, bandwidth_floor, slope_bound
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.observers.super_twisting import SuperTwisting, bandwidth_floor, slope_bound
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T, setting, spoilt
 from tests.observers.matrix_observer import L1, L2, MatrixObserver

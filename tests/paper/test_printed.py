@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.controllers import ControllerContext
-from dcmp_hil.controllers.pd_compensated import PdCompensated
-from dcmp_hil.model import Model
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.paper import PaperObserver
+from dcmp_hil.control.controllers import ControllerContext
+from dcmp_hil.control.controllers.pd_compensated import PdCompensated
+from dcmp_hil.control.model import Model
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.paper.printed import PrintedEq8, PrintedEq9, PrintedEq10
 from dcmp_hil.paper.reproduction import VARIANTS
 from dcmp_hil.values import Estimate, Reference, Sample
@@ -77,7 +77,7 @@ def test_printed_eq10_divides_once_more() -> None:
 
 
 def test_controller_of_your_own_gets_the_position_it_asks_for() -> None:
-    own = "controller.kind=dcmp_hil.controllers.pd_compensated:PdCompensated"
+    own = "controller.kind=dcmp_hil.control.controllers.pd_compensated:PdCompensated"
     shipped = run(load_rig("paper"), duration=0.05, fast=True)
     same = run(load_rig("paper", [own]), duration=0.05, fast=True)  # position = "measured" stays
     other = run(load_rig("paper", [own, "controller.position=estimated"]), duration=0.05, fast=True)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from dcmp_hil import controllers
+    from dcmp_hil.control import controllers
     from dcmp_hil.values import Estimate, Reference
     from tests.cli.conftest import Outcome
 

@@ -12,15 +12,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import chirp
 
+from dcmp_hil.control.references.periodic import Chirp, Sine
+from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid, trapezoid
+from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.references.periodic import Chirp, Sine
-from dcmp_hil.references.piecewise import Hold, Step, Trapezoid, trapezoid
-from dcmp_hil.references.table import Table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.references import ReferenceSource
+    from dcmp_hil.control.references import ReferenceSource
 
 _H = 1e-5  # s, half the span of a finite difference
 

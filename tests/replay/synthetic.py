@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 from dcmp_hil.replay import Recording
 from sim_backend.plant import MoreauPlant
 

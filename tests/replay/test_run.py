@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dcmp_hil.control.observers import ObserverContext
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.observers import ObserverContext
-from dcmp_hil.observers.super_twisting import SuperTwisting
 from dcmp_hil.replay import ReplayResult, ReplaySettings, replay
 from dcmp_hil.values import Estimate, Sample
 from tests.replay.synthetic import INERTIA, MODEL, Truth, lose, swing

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from dcmp_hil import run
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 from sim_backend.plant import EulerPlant, MoreauPlant
 from tests.helpers import STEADY, bench, last
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.rig_view import RigView

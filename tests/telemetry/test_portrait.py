@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.link import DEVICE, HOST, LinkWatch, in_order

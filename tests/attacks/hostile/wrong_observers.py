@@ -6,11 +6,11 @@ import random
 from collections import deque
 from typing import TYPE_CHECKING
 
-from dcmp_hil.observers.super_twisting import SuperTwisting
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import ObserverContext
+    from dcmp_hil.control.observers import ObserverContext
     from dcmp_hil.values import Sample
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.observers import Observer, ObserverContext
-    from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.control.observers import Observer, ObserverContext
+    from dcmp_hil.control.observers.super_twisting import Tuning
     from dcmp_hil.stop import Stop
     from dcmp_hil.values import Estimate, Reference, Sample
 

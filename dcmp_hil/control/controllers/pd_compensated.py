@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil.common.section import NotNegative, Section
-from dcmp_hil.controllers import Gains
+from dcmp_hil.control.controllers import Gains
 
 if TYPE_CHECKING:
-    from dcmp_hil.controllers import ControllerContext
+    from dcmp_hil.control.controllers import ControllerContext
     from dcmp_hil.values import Estimate, Reference
 
 

@@ -9,12 +9,12 @@ from pydantic import Field
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive, Section
-from dcmp_hil.observers import standing_still
-from dcmp_hil.observers.matched import Gains, copy_step, luenberger_copy, matched_gains
+from dcmp_hil.control.observers import standing_still
+from dcmp_hil.control.observers.matched import Gains, copy_step, luenberger_copy, matched_gains
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import ObserverContext
+    from dcmp_hil.control.observers import ObserverContext
 
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
 _SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.values import Reference
 
 if TYPE_CHECKING:
-    from dcmp_hil.references import ReferenceSource
+    from dcmp_hil.control.references import ReferenceSource
 
 LOWERING = 2.0  # s, from any position of the arm to hanging
 _CHANGING = 1.0  # s, from one reference into another, at least

@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil.common.section import Positive, Section
-from dcmp_hil.observers import standing_still
+from dcmp_hil.control.observers import standing_still
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
-    from dcmp_hil.observers import ObserverContext
+    from dcmp_hil.control.observers import ObserverContext
 
 _LAMBDA1, _LAMBDA2, _LAMBDA3 = 2.0, 1.5, 1.1
 

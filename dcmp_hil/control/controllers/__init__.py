@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from dcmp_hil.model import Model
+from dcmp_hil.control.model import Model
 from dcmp_hil.values import Estimate, Reference
 
 

@@ -9,7 +9,7 @@ from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
-    from dcmp_hil.model import Model
+    from dcmp_hil.control.model import Model
     from dcmp_hil.values import Sample
 
 

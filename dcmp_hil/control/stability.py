@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dcmp_hil.observers.matched import luenberger_copy, matched_gains
-from dcmp_hil.predictor import held_input
+from dcmp_hil.control.observers.matched import luenberger_copy, matched_gains
+from dcmp_hil.control.predictor import held_input
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.controllers import Gains
-    from dcmp_hil.model import Model
-    from dcmp_hil.observers.super_twisting import Tuning
+    from dcmp_hil.control.controllers import Gains
+    from dcmp_hil.control.model import Model
+    from dcmp_hil.control.observers.super_twisting import Tuning
 
     Matrix = NDArray[np.float64]
 

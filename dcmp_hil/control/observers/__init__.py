@@ -2,8 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
+from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.model import Model
 from dcmp_hil.values import Estimate, Sample
 
 

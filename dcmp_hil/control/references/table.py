@@ -10,8 +10,8 @@ from typing import Literal
 from pydantic import Field
 
 from dcmp_hil.common.csv import read_columns
+from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.references import ReferenceSettings
 from dcmp_hil.values import Reference
 
 _FEWEST_ROWS = 2

@@ -4,7 +4,7 @@ import math
 from typing import Literal
 
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.references import ReferenceSettings
+from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.values import Reference
 
 
