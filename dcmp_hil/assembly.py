@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.fault_injection import Faults
-    from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest
     from dcmp_hil.plugins.roles import Role

@@ -45,9 +45,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.ipc.ring import Ring
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.makers import SinkMaker
-    from dcmp_hil.telemetry.ring import Ring
 
 SETTLING = 5.0
 """Simulated minutes before memory counts."""

@@ -20,14 +20,14 @@ import numpy as np
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.rules import within_reason
 from dcmp_hil.errors import ConfigError, DcmpError, TripError
-from dcmp_hil.live.mailbox import Mailbox
+from dcmp_hil.ipc.mailbox import Mailbox
 from dcmp_hil.live.settable import changed, settable
 from dcmp_hil.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from dcmp_hil.live.change import Change
+    from dcmp_hil.control.change import Change
 
 _DURATION = 5.0  # s, of a run
 _KINDS = (

@@ -25,12 +25,12 @@ from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import DcmpError, IncompleteError, TripError
 from dcmp_hil.fault_injection import inject, needs_wire
 from dcmp_hil.platform import process_log
+from dcmp_hil.platform.disk_space import room_for
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.room import room_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,8 +8,8 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.watching import web_viewer
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import pause
+from dcmp_hil.platform.display import display_problem
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.display import display_problem
 
 _PAUSE = 0.5  # s
 

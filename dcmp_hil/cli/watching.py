@@ -6,9 +6,9 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import console
+from dcmp_hil.platform.display import display_available, display_problem
+from dcmp_hil.platform.other_users import others_here
 from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.display import display_available, display_problem
-from dcmp_hil.telemetry.peers import others_here
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.telemetry.figures import Figures
 
 

@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.control.controllers import Gains
-from dcmp_hil.live.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
+from dcmp_hil.ipc.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
@@ -14,12 +14,12 @@ from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.control.change import Change
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.observers.super_twisting import Tuning
     from dcmp_hil.control.trajectory import Trajectory
-    from dcmp_hil.live.change import Change
-    from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.safety.chatter import Chatter
 
 RAMP = 0.25  # s, over which gains go from old to new

@@ -16,24 +16,24 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
+from dcmp_hil.ipc.ring import Ring, capacity_of
+from dcmp_hil.ipc.run_end import LIVES
+from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.live.crowd import BETWEEN, PATIENCE, Crowd, listen
 from dcmp_hil.live.knobs import knobs
-from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.live.places import peer_of, socket_of
 from dcmp_hil.live.settable import changed, doubts
 from dcmp_hil.live.state import state_of
 from dcmp_hil.live.stopping import stop_run
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.stop_request import SIGNALS, TAKEN
-from dcmp_hil.run_end import LIVES
-from dcmp_hil.telemetry.ring import Ring, capacity_of
-from dcmp_hil.telemetry.shared import mapped
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.live.mailbox import Answer
+    from dcmp_hil.ipc.mailbox import Answer
     from dcmp_hil.live.stopping import Stopped
 
 _LONGEST = 1 << 16  # bytes of a request

@@ -9,9 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.mailbox import SIZE, Mailbox
+from dcmp_hil.ipc.mailbox import SIZE, Mailbox
+from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.platform.user_folder import private, temporary, usable
-from dcmp_hil.telemetry.shared import mapped
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 _LONGEST = 80  # characters: the path of a socket may have 107

@@ -13,13 +13,13 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.ipc.mailbox import SIZE, Mailbox
+from dcmp_hil.ipc.run_end import AT_ZERO, UNCONFIRMED
+from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live.control import Setup
-from dcmp_hil.live.mailbox import SIZE, Mailbox
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import SIGNALS
-from dcmp_hil.run_end import AT_ZERO, UNCONFIRMED
-from dcmp_hil.telemetry.shared import mapped, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable

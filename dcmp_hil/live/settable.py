@@ -12,11 +12,11 @@ from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.config.words import toml_value
 from dcmp_hil.control import observers
+from dcmp_hil.control.change import Change
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.change import Change
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -12,14 +12,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.live.mailbox import STOP
+from dcmp_hil.ipc.mailbox import STOP
+from dcmp_hil.ipc.run_end import AT_ZERO, SAID
 from dcmp_hil.platform.clock import MonotonicClock, pause
-from dcmp_hil.run_end import AT_ZERO, SAID
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.live.mailbox import Mailbox
+    from dcmp_hil.ipc.mailbox import Mailbox
 
 LIMIT = 1.0
 """s, within which STOP is confirmed or told as failed."""

@@ -14,12 +14,12 @@ from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.ipc.mailbox import Mailbox
+from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.live.changes import LiveChanges
-from dcmp_hil.live.mailbox import Mailbox
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.recording.foreign import UnreadTable, check_numbers, refuse_named
-from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.values import EventKind, Reference, Sample
 
 if TYPE_CHECKING:

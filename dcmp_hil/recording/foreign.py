@@ -8,7 +8,7 @@ import numpy as np
 
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.ipc.ring import FIELDS
 
 if TYPE_CHECKING:
     from pathlib import Path

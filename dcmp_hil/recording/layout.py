@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter
 
 from dcmp_hil.common.printable_text import readable
-from dcmp_hil.telemetry.ring import FIELDS
+from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.values import DATA, Event, EventKind, Level
 
 if TYPE_CHECKING:

@@ -20,15 +20,15 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.ipc.child_process import end_process, how_it_ended, receive, receive_from_working
+from dcmp_hil.ipc.ring import Ring, size_of
+from dcmp_hil.ipc.shared_memory import Ledger, mapped, reserve
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
-from dcmp_hil.telemetry.answers import end_process, how_it_ended, receive, receive_from_working
 from dcmp_hil.telemetry.audience import Audience
 from dcmp_hil.telemetry.child import DONE, FIGURES, UP, Setup, State
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
-from dcmp_hil.telemetry.ring import Ring, size_of
-from dcmp_hil.telemetry.shared import Ledger, mapped, reserve
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.control.model import Model
-    from dcmp_hil.telemetry.ring import Ring
+    from dcmp_hil.ipc.ring import Ring
 
 INTERVAL = 0.1  # s between two blocks in real time
 _WAITING = 10_000  # events

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
+from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.blueprint import dashboard
 from dcmp_hil.telemetry.feed import send
 from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.scenery import log_scenery
 from dcmp_hil.values import Event, EventKind
 

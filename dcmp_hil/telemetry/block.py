@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
-from dcmp_hil.telemetry.ring import FIELDS, NOWHERE
+from dcmp_hil.ipc.ring import FIELDS, NOWHERE
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,16 +18,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.ipc.child_process import MESSAGE
+from dcmp_hil.ipc.ring import Ring, size_of
+from dcmp_hil.ipc.shared_memory import Ledger, mapped
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.telemetry.answers import MESSAGE
+from dcmp_hil.platform.heap import trim
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
 from dcmp_hil.telemetry.died import how_it_died
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
-from dcmp_hil.telemetry.heap import trim
 from dcmp_hil.telemetry.outlet import THREAD
-from dcmp_hil.telemetry.ring import Ring, size_of
-from dcmp_hil.telemetry.shared import Ledger, mapped
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import NamedTuple
 
+from dcmp_hil.ipc.run_end import FORCED, SAID, end_in
 from dcmp_hil.platform.clock import MonotonicClock, pause
-from dcmp_hil.run_end import FORCED, SAID, end_in
 
 _DYING = 5.0  # s for a process whose line has gone to be gone as well
 _LOOK = 0.002  # s

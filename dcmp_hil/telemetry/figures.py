@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dcmp_hil.telemetry.shared import Log
+from dcmp_hil.ipc.shared_memory import Log
 from dcmp_hil.telemetry.signals import columns, names
 from dcmp_hil.values import Event, EventKind
 

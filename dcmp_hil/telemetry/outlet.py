@@ -10,7 +10,7 @@ from queue import Full, Queue
 from typing import TYPE_CHECKING
 
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.telemetry.room import room_for, size_of
+from dcmp_hil.platform.disk_space import room_for, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,9 +6,9 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
+from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.audience import Audience, Service, Sink
 from dcmp_hil.telemetry.link import LinkWatch
-from dcmp_hil.telemetry.ring import Ring
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

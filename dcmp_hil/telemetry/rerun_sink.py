@@ -12,13 +12,13 @@ import rerun as rr
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.disk_space import kept_for_data, room_for, short_of
+from dcmp_hil.platform.display import display_problem
+from dcmp_hil.platform.other_users import strangers
 from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.beginning import begin, warm_up
-from dcmp_hil.telemetry.display import display_problem
 from dcmp_hil.telemetry.feed import Feed
 from dcmp_hil.telemetry.outlet import Outlet
-from dcmp_hil.telemetry.peers import strangers
-from dcmp_hil.telemetry.room import kept_for_data, room_for, short_of
 from dcmp_hil.telemetry.troubles import NO_ROOM, NO_WINDOW, STRANGERS, incomplete, spared, stuck
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.telemetry.room import room_for
+from dcmp_hil.platform.disk_space import room_for
 
 if TYPE_CHECKING:
     from pathlib import Path

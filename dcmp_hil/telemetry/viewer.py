@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock, pause
-from dcmp_hil.telemetry.tied import tied
+from dcmp_hil.platform.parent_death import tied
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -23,18 +23,18 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.backends.serial_link import open_port
+from dcmp_hil.ipc.mailbox import SIZE, STOP, Mailbox
+from dcmp_hil.ipc.ring import Ring, size_of
+from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED
+from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import places, stopping
 from dcmp_hil.live.control import Server, Setup
-from dcmp_hil.live.mailbox import SIZE, STOP, Mailbox
 from dcmp_hil.live.stopping import End, stop_run
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import Interrupted, StopRequest
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED
 from dcmp_hil.telemetry.died import how_it_died
-from dcmp_hil.telemetry.ring import Ring, size_of
-from dcmp_hil.telemetry.shared import mapped, reserve
 from dcmp_hil.values import Truth
 from tests.firmware.core_library import compiler
 from tests.helpers import bench, cycle

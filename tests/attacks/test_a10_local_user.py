@@ -21,8 +21,8 @@ import pytest
 
 from dcmp_hil.live.client import status
 from dcmp_hil.live.places import folder, socket_of
+from dcmp_hil.platform import other_users
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.telemetry import peers
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.viewer import answers
 from tests.live.processes import BOUND, own_folder, started, until, until_running
@@ -142,7 +142,7 @@ def test_this_user_s_own_viewers_are_nobody_s_business() -> None:
         server.listen()
         port = server.getsockname()[1]
         with socket.create_connection(("127.0.0.1", port)):
-            assert peers.strangers(port) == []
+            assert other_users.strangers(port) == []
 
 
 def test_sockets_are_this_user_s_alone_and_the_kernel_says_who_knocks(tmp_path: Path) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.control.change import Change
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.change import Change
-from dcmp_hil.live.mailbox import Answer, Mailbox
+from dcmp_hil.ipc.mailbox import Answer, Mailbox
 from dcmp_hil.live.settable import changed
 from tests.helpers import HeldRun
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dcmp_hil.live.mailbox import APPLIED, FAILED, LOWERING
+from dcmp_hil.ipc.mailbox import APPLIED, FAILED, LOWERING
 from tests.helpers import T
 from tests.live.here import ChangedRun
 
@@ -131,7 +131,7 @@ def test_run_is_the_same_to_the_bit_when_no_change_is_applied(*, withdrawn: bool
 
 
 def test_run_goes_on_when_the_slot_holds_rubbish() -> None:
-    from dcmp_hil.live.change import Change
+    from dcmp_hil.control.change import Change
 
     run = ChangedRun({_AT: Change("nonsense", {}, tuning=(1.0,))})  # type: ignore[arg-type]
     result = run.run()

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
+from dcmp_hil.ipc.ring import Ring, size_of
+from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import control
-from dcmp_hil.live.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
-from dcmp_hil.telemetry.ring import Ring, size_of
-from dcmp_hil.telemetry.shared import mapped, reserve
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 

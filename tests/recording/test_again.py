@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil import run
-from dcmp_hil.live.mailbox import APPLIED
+from dcmp_hil.ipc.mailbox import APPLIED
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.recording.again import run_again
 from dcmp_hil.recording.changes import changes_in

@@ -22,12 +22,12 @@ from mcap_ros2.decoder import DecoderFactory
 from dcmp_hil import load_rig
 from dcmp_hil.config import load_table, shipped_rigs
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.ipc.ring import FIELDS, Ring, size_of
 from dcmp_hil.recording import layout
 from dcmp_hil.recording.about import about, git_state, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.session import Session
-from dcmp_hil.telemetry.ring import FIELDS, Ring, size_of
 from dcmp_hil.values import CauseData, Event, EventKind
 from tests.helpers import bench
 from tests.telemetry.runs import EVENTS, blocks, cycle, truth
@@ -146,7 +146,7 @@ from dcmp_hil.platform.clock import pause
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.telemetry.audience import Audience, Service
-from dcmp_hil.telemetry.ring import Ring
+from dcmp_hil.ipc.ring import Ring
 from tests.helpers import bench
 import mmap
 rate, capacity, folder = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.control.model import Model
+from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
 from dcmp_hil.telemetry.rig_view import RigView
-from dcmp_hil.telemetry.ring import Ring
 from dcmp_hil.values import (
     UNKNOWN_TRUTH,
     Cycle,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.block import Aligner, Block
-from dcmp_hil.telemetry.ring import Ring
 from dcmp_hil.telemetry.signals import SIGNALS, by_plot, columns
 from dcmp_hil.values import UNKNOWN_TRUTH, Reference, Truth
 from tests.helpers import T, cycle

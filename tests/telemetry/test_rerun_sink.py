@@ -15,6 +15,7 @@ import rerun as rr
 
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.ipc.ring import FIELDS, Ring
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry import rerun_sink
 from dcmp_hil.telemetry import viewer as window
@@ -22,7 +23,6 @@ from dcmp_hil.telemetry.audience import Audience
 from dcmp_hil.telemetry.outlet import Outlet
 from dcmp_hil.telemetry.rerun_sink import RerunSink
 from dcmp_hil.telemetry.rig_view import view_of
-from dcmp_hil.telemetry.ring import FIELDS, Ring
 from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.telemetry.titles import title
 from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, cycle, entities, feed, read_back, truth, values

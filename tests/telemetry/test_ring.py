@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.telemetry.ring import FIELDS, Ring, size_of
+from dcmp_hil.ipc.ring import FIELDS, Ring, size_of
 from dcmp_hil.values import Truth
 from tests.helpers import cycle
 
@@ -77,7 +77,7 @@ def test_rows_overwritten_while_they_are_copied_are_left_out_and_counted(
         return arange(first, last)
 
     with monkeypatch.context() as patch:
-        patch.setattr("dcmp_hil.telemetry.ring.np.arange", slow)
+        patch.setattr("dcmp_hil.ipc.ring.np.arange", slow)
         rows = ring.drain()
     assert rows[:, 0].tolist() == [0, 1, 2, 3][overtaken:]
     assert ring.dropped == min(overtaken, 4)
@@ -85,7 +85,7 @@ def test_rows_overwritten_while_they_are_copied_are_left_out_and_counted(
 
 _READS = """
 import mmap, sys
-from dcmp_hil.telemetry.ring import Ring
+from dcmp_hil.ipc.ring import Ring
 with open(sys.argv[1], "r+b") as file:
     ring = Ring(64, mmap.mmap(file.fileno(), 0))
 print("up", flush=True)

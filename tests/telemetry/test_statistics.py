@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.ring import FIELDS
 from dcmp_hil.telemetry.statistics import BOUNDS_US, Durations, Histogram, Statistics, Summary
 
 if TYPE_CHECKING:

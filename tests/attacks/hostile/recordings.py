@@ -12,9 +12,9 @@ import numpy as np
 import zstandard
 from lz4 import frame as lz4  # type: ignore[import-untyped]
 
+from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.recording.about import rig_json
 from dcmp_hil.recording.layout import CYCLE_SCHEMA
-from dcmp_hil.telemetry.ring import FIELDS
 from tests.helpers import bench
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.common.printable_text import readable
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.run_end import FORCED, SAID, UNCONFIRMED, WORD
+from dcmp_hil.ipc.run_end import FORCED, SAID, UNCONFIRMED, WORD
 
 if TYPE_CHECKING:
     import mmap
 
-    from dcmp_hil.live.change import Change
+    from dcmp_hil.control.change import Change
 
 _WORDS = 16  # of 8 bytes
 _ASKED, _TAKEN, _ANSWER, _PHASE, _LENGTH, _CHECK, _LAST, _BELL, _STOP, _STOP_TAKEN, _HANDLERS, _END = range(

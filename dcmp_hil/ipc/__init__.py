@@ -1,0 +1,1 @@
+"""What processes of one run share: memory without a name, ring, mailbox, answers of a child process."""
