@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from dcmp_hil.backends import open_backend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import controllers, observers
@@ -14,6 +13,7 @@ from dcmp_hil.control.observers.known_friction import KnownFriction
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory
+from dcmp_hil.device import open_backend
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.backends.goodbye import DeviceEnd
     from dcmp_hil.config import Rig
+    from dcmp_hil.device.goodbye import DeviceEnd
     from dcmp_hil.platform.realtime import Grant
     from dcmp_hil.safety.polarity_check import MotorGain
     from dcmp_hil.telemetry.statistics import Summary

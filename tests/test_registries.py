@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, get_args
 import pytest
 import rerun.blueprint as rrb
 
-from dcmp_hil.backends import kinds
-from dcmp_hil.backends.links import make_link
 from dcmp_hil.config import load_rig
 from dcmp_hil.config.backends import Device, SimBoard
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import SimSection
+from dcmp_hil.device import kinds
+from dcmp_hil.device.links import make_link
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named
 from dcmp_hil.telemetry import signals

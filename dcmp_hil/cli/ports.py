@@ -40,7 +40,7 @@ def ports(
     """
     from rich.text import Text
 
-    from dcmp_hil.backends.discovery import find_devices
+    from dcmp_hil.device.discovery import find_devices
     from dcmp_hil.platform.clock import MonotonicClock
 
     found = 0

@@ -6,10 +6,10 @@ import select
 from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
-from dcmp_hil.backends.can_link import CanLink
-from dcmp_hil.backends.failures import reason
-from dcmp_hil.backends.serial_link import FAILURES, open_port, path_of, write_now
 from dcmp_hil.conformance.check import CAN, COBS, SLCAN
+from dcmp_hil.device.can_link import CanLink
+from dcmp_hil.device.failures import reason
+from dcmp_hil.device.serial_link import FAILURES, open_port, path_of, write_now
 from dcmp_hil.errors import LinkError
 from dcmp_hil.wire import cobs, slcan
 

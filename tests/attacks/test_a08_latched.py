@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.backends.device import DeviceBackend
-from dcmp_hil.backends.history import History
-from dcmp_hil.backends.serial_link import SerialLink
+from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.history import History
+from dcmp_hil.device.serial_link import SerialLink
 from dcmp_hil.errors import OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.session import Session

@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from dcmp_hil.backends.clock_ratio import ClockRatio
-from dcmp_hil.backends.tick_watch import TickWatch
+from dcmp_hil.device.clock_ratio import ClockRatio
+from dcmp_hil.device.tick_watch import TickWatch
 from dcmp_hil.wire.messages import SampleReport, State
 
 PERIOD = 1e6  # ns

@@ -10,15 +10,15 @@ import can
 import pytest
 import serial
 
-from dcmp_hil.backends.can_link import CanLink
-from dcmp_hil.backends.serial_link import SerialLink
 from dcmp_hil.config.backends import Can
+from dcmp_hil.device.can_link import CanLink
+from dcmp_hil.device.serial_link import SerialLink
 from dcmp_hil.errors import ConfigError, DcmpError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 from tests.backends.line import line
 
 if TYPE_CHECKING:
-    from dcmp_hil.backends.link import Link
+    from dcmp_hil.device.link import Link
 
 CARRIERS = pytest.mark.parametrize("carrier", ["cobs", "slcan"])
 OPENING = {"cobs": b"\0", "slcan": b"\rC\rS8\rN\rO\r"}
@@ -81,7 +81,7 @@ def test_open_that_fails_half_way_closes_the_port(
     carrier: str, error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with line() as far:
-        monkeypatch.setattr(f"dcmp_hil.backends.{MODULE[carrier]}.write_now", raising(error))
+        monkeypatch.setattr(f"dcmp_hil.device.{MODULE[carrier]}.write_now", raising(error))
         link = link_to(far.path, carrier)
         with pytest.raises((DcmpError, KeyboardInterrupt)) as caught:  # keeps alive what was left open
             link.open()

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import can
 import pytest
 
-from dcmp_hil.backends.can_link import CanLink
 from dcmp_hil.config.backends import Can
+from dcmp_hil.device.can_link import CanLink
 from dcmp_hil.errors import LinkError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 

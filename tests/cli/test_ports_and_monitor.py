@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import can
 import pytest
 
-from dcmp_hil.backends import open_backend
 from dcmp_hil.config import load_rig
 from dcmp_hil.config.backends import Can, Serial
+from dcmp_hil.device import open_backend
 from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
@@ -94,7 +94,7 @@ def test_ports_sees_a_device_in_use_on_a_bus_and_leaves_it_alone(
 ) -> None:
     with on_bench("can virtual") as found:
         channel = found.rig.backend.channel  # type: ignore[union-attr]
-        monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
+        monkeypatch.setattr("dcmp_hil.device.discovery._can_channels", lambda: [("virtual", channel)])
         with found.device() as backend:
             drive(backend, 1.0, 20)
             found.hurry()
@@ -191,7 +191,7 @@ def test_ports_names_what_is_not_the_default(cli: Cli, carrier: str) -> None:
 def test_ports_lists_every_device_of_a_bus(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     channel = "ports-two-devices"
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
+    monkeypatch.setattr("dcmp_hil.device.discovery._can_channels", lambda: [("virtual", channel)])
     pumps = []
     for node in (9, 2):
         rig = bench("backend.kind=sim-board", f"backend.node={node}")
@@ -213,7 +213,7 @@ def test_ports_and_monitor_notice_two_devices_with_one_node(
 ) -> None:
     channel = "ports-one-node-twice"
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    monkeypatch.setattr("dcmp_hil.backends.discovery._can_channels", lambda: [("virtual", channel)])
+    monkeypatch.setattr("dcmp_hil.device.discovery._can_channels", lambda: [("virtual", channel)])
     ending = threading.Event()
 
     def two_devices() -> None:
@@ -277,7 +277,7 @@ def test_ports_and_monitor_close_what_could_not_be_opened(cli: Cli, monkeypatch:
         def close(self) -> None:
             closed.append(self.name)
 
-    for room in ("dcmp_hil.backends.discovery", "dcmp_hil.cli.monitoring"):
+    for room in ("dcmp_hil.device.discovery", "dcmp_hil.cli.monitoring"):
         monkeypatch.setattr(f"{room}.make_link", lambda *_: Broken())
     assert cli("ports", "/dev/ttyX").code == 0
     assert closed

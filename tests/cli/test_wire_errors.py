@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 import serial
 
-from dcmp_hil.backends import serial_link
+from dcmp_hil.device import serial_link
 from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump
 from tests.helpers import bench
@@ -124,7 +124,7 @@ def test_wrong_baud_shows_as_damaged_frames(cli: Cli) -> None:
 
 def test_wrong_firmware(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     for room in ("handshake", "refusals"):
-        monkeypatch.setattr(f"dcmp_hil.backends.{room}.PROTOCOL_HASH", 0x0BADCAFE)
+        monkeypatch.setattr(f"dcmp_hil.device.{room}.PROTOCOL_HASH", 0x0BADCAFE)
     with device() as pump:
         outcome = start(cli, path_of(pump))
         assert not pump.board.enable

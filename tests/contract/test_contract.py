@@ -24,7 +24,7 @@ from tests.contract.hooks import Doubler, Dropper, Flipper, Swapper, on_way_down
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dcmp_hil.backends import Backend
+    from dcmp_hil.device import Backend
     from dcmp_hil.values import Sample
     from tests.contract.benches import Bench
     from tests.contract.hooks import Chunk
@@ -309,8 +309,8 @@ def test_host_that_does_not_fit_gives_the_device_back_at_once(kind: str) -> None
 
 @wired
 def test_other_protocol_is_refused_with_both_versions(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dcmp_hil.backends.handshake.PROTOCOL_HASH", 0x12345678)
-    monkeypatch.setattr("dcmp_hil.backends.refusals.PROTOCOL_HASH", 0x12345678)
+    monkeypatch.setattr("dcmp_hil.device.handshake.PROTOCOL_HASH", 0x12345678)
+    monkeypatch.setattr("dcmp_hil.device.refusals.PROTOCOL_HASH", 0x12345678)
     with on_bench(kind) as bench:
         with pytest.raises(OpenError) as caught:
             bench.make().__enter__()

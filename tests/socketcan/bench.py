@@ -7,8 +7,8 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Self
 
 from dcmp_hil import load_rig
-from dcmp_hil.backends.can_link import open_can
 from dcmp_hil.config.backends import Can
+from dcmp_hil.device.can_link import open_can
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from dcmp_hil.backends.device import DeviceBackend
+    from dcmp_hil.device.device import DeviceBackend
 
 RIG = "bench-can"
 WATCHDOG_MS, BRISK_HZ = 20, 250  # of the shipped rig; slower than that, for runs in which other things count

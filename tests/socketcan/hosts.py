@@ -7,8 +7,6 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-import dcmp_hil.backends.can_link
-import dcmp_hil.cli.running  # noqa: F401 - the copies have them
 from dcmp_hil.cli import main
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ import math
 import secrets
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.backends import refusals
-from dcmp_hil.backends.caller import PATIENCE
-from dcmp_hil.backends.clearing import Clearing
-from dcmp_hil.backends.comparison import differences, remarks
-from dcmp_hil.backends.history import history_of
-from dcmp_hil.backends.parameters import Parameters
+from dcmp_hil.device import refusals
+from dcmp_hil.device.caller import PATIENCE
+from dcmp_hil.device.clearing import Clearing
+from dcmp_hil.device.comparison import differences, remarks
+from dcmp_hil.device.history import history_of
+from dcmp_hil.device.parameters import Parameters
 from dcmp_hil.errors import BackendError, ConfigError
 from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.values import Fault
@@ -33,9 +33,9 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.backends.caller import Caller
-    from dcmp_hil.backends.link import Link
-    from dcmp_hil.backends.terms import Terms
+    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.terms import Terms
     from dcmp_hil.errors import OpenError
     from dcmp_hil.platform.clock import Clock
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from dcmp_hil.backends.tick_watch import TickWatch
+from dcmp_hil.device.tick_watch import TickWatch
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
@@ -20,7 +20,7 @@ from dcmp_hil.wire.messages import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.backends.link import Link
+    from dcmp_hil.device.link import Link
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message

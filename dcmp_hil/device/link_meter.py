@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dcmp_hil.backends.clock_ratio import ClockRatio
+from dcmp_hil.device.clock_ratio import ClockRatio
 from dcmp_hil.wire.quality import LinkCounters, growth
 
 if TYPE_CHECKING:
-    from dcmp_hil.backends.link import Link
+    from dcmp_hil.device.link import Link
     from dcmp_hil.wire.messages import Health, SampleReport
 
 _LATE = 0.5  # of a period

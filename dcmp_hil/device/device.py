@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NoReturn, Self
 
-from dcmp_hil.backends import refusals
-from dcmp_hil.backends.caller import MOST_WAITING, Caller
-from dcmp_hil.backends.goodbye import DeviceEnd, Goodbye
-from dcmp_hil.backends.handshake import Handshake
-from dcmp_hil.backends.left_run import another_runs, why_left
-from dcmp_hil.backends.link_meter import LinkMeter
-from dcmp_hil.backends.terms import Terms
 from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.device import refusals
+from dcmp_hil.device.caller import MOST_WAITING, Caller
+from dcmp_hil.device.goodbye import DeviceEnd, Goodbye
+from dcmp_hil.device.handshake import Handshake
+from dcmp_hil.device.left_run import another_runs, why_left
+from dcmp_hil.device.link_meter import LinkMeter
+from dcmp_hil.device.terms import Terms
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
@@ -24,8 +24,8 @@ from dcmp_hil.wire.quality import judge
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from dcmp_hil.backends.link import Link
     from dcmp_hil.config import Rig
+    from dcmp_hil.device.link import Link
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.quality import Concern, LinkCounters

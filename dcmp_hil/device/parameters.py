@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.backends import refusals
-from dcmp_hil.backends.caller import PATIENCE
-from dcmp_hil.backends.comparison import COMPARED, is_possible
+from dcmp_hil.device import refusals
+from dcmp_hil.device.caller import PATIENCE
+from dcmp_hil.device.comparison import COMPARED, is_possible
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, ParameterValue, Result
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.backends.caller import Caller
-    from dcmp_hil.backends.terms import Terms
+    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.terms import Terms
 
 _LOOKS = 3  # at a count before it is taken for the arm's
 _COUNTS = 2**24  # of a SAMPLE

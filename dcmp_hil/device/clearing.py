@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.backends import refusals
-from dcmp_hil.backends.caller import PATIENCE
+from dcmp_hil.device import refusals
+from dcmp_hil.device.caller import PATIENCE
 from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, State, StopReason
 
 if TYPE_CHECKING:
-    from dcmp_hil.backends.caller import Caller
+    from dcmp_hil.device.caller import Caller
     from dcmp_hil.platform.clock import Clock
 
 _REPORT = 0.25  # s: FAULT comes every 100 ms
