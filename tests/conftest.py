@@ -54,7 +54,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print the figures of the tests that passed, whichever worker ran them."""
+    """Print the figures of the tests that passed, from every worker."""
     passed = terminalreporter.stats.get("passed", [])
     lines = sorted(str(line) for report in passed for name, line in report.user_properties if name == FIGURE)
     if lines:

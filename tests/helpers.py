@@ -70,7 +70,7 @@ def cycle(
     applied: float = 0.0,
     sent: float = 0.0,
 ) -> Cycle:
-    """Make a period for whoever looks on."""
+    """Return a cycle as the loop gives it to telemetry."""
     nothing = (0.0, 0.0, 0.0)
     return Cycle(
         Sample(t, position, applied), Estimate(*nothing), Reference(*nothing), sent, sent, Timing(T, 0.0, 0.0)
@@ -169,7 +169,7 @@ class BlindFromTheStart(StuckEncoder):
 
 
 class DelayedPlant(SimBackend):
-    """The voltage reaches the motor some periods later than anybody knows."""
+    """The voltage reaches the motor some periods later than the rig says."""
 
     periods = 0
 
@@ -208,11 +208,11 @@ class LosesSamples(SimBackend):
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
         super().__init__(rig, clock)
-        self._luck = random.Random(rig.sim.seed)
+        self._rng = random.Random(rig.sim.seed)
 
     def read(self) -> Sample:
         sample = super().read()
-        while self._luck.random() < 0.05:
+        while self._rng.random() < 0.05:
             sample = super().read()
         return sample
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class _Mine:
-    """An observer and a controller of somebody's own."""
+    """An observer and a controller of a user's own."""
 
     def __init__(self, setting: Any, gain: float = 1.0) -> None:
         self.setting, self.gain = setting, gain

@@ -83,7 +83,7 @@ def test_ranges_leave_an_estimate_what_the_encoder_shows_too_much() -> None:
         assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=velocity)) == reason
 
 
-def test_limits_are_judged_by_the_watch_whatever_the_run_s_observer_says() -> None:
+def test_limits_are_judged_by_the_watch_and_not_by_the_run_s_observer() -> None:
     observer = _Finds(0.0)
     watch = DisturbanceWatch(observer, setting(), 50.0, ranges=Ranges(6.0, 2.0, seen_by="the watch"))
     assert _reason(watch, estimate=Estimate(0.0, 99.0, 0.0)) == ""

@@ -1,4 +1,4 @@
-"""Wrong counts: one is left out, the third ends the run, and what else is odd is nobody's business here."""
+"""Wrong counts: one is left out, the third ends the run, and other oddities are not the filter's."""
 
 from __future__ import annotations
 

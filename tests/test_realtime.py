@@ -1,4 +1,4 @@
-"""Real time: everything is tried, reported, and given back, whoever grants it or not.
+"""Real time: everything is tried, reported, and given back, granted or not.
 
 What the machine of the tests grants is not known, so the system's own calls are recorded and answered here.
 """
@@ -71,7 +71,7 @@ def system(monkeypatch: pytest.MonkeyPatch) -> _System:
 
 @pytest.fixture
 def helper() -> Iterator[int]:
-    """Start a thread that looks on; give its number."""
+    """Start a thread that only waits; yield its number."""
     done = threading.Event()
     thread = threading.Thread(target=done.wait)
     thread.start()

@@ -43,7 +43,7 @@ MORE = (
 
 
 def rig_of(kind: str, *overrides: str) -> Any:
-    """Return the bench rig with a kind of backend, whatever keys it needs."""
+    """Return the bench rig with a kind of backend, and the keys that it needs."""
     needed = {"serial": ("backend.port=/dev/ttyACM0",)}.get(kind, ())
     return bench(f"backend.kind={kind}", *needed, *overrides)
 
@@ -88,7 +88,7 @@ def test_what_a_backend_is_agrees_with_what_its_factory_says(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", [*SHIPPED, "tests.helpers:LosesSamples"])
-def test_a_start_without_a_probe_is_warned_of_wherever_a_motor_may_move(kind: str) -> None:
+def test_a_start_without_a_probe_is_warned_of_where_a_motor_may_move(kind: str) -> None:
     moves = kind not in SHIPPED or not is_simulated(kind)
     warned = any(
         "supervisor.probe" in sentence for sentence in warnings(rig_of(kind, "supervisor.probe=off"))

@@ -1,4 +1,4 @@
-"""One protocol for "stop": every check returns it, raises nothing, and calls nobody back."""
+"""One protocol for "stop": every check returns it, raises nothing, and calls nothing back."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _checks() -> list[Check]:
 
 
 @pytest.mark.parametrize("check", _checks(), ids=lambda check: type(check).__name__)
-def test_a_check_raises_nothing_whatever_it_is_shown(check: Check) -> None:
+def test_a_check_raises_nothing_for_any_input(check: Check) -> None:
     for t, position, rest in product(ODD, repeat=3):
         stop = check.check(Sample(t, position, rest, 3), Estimate(position, rest, t))
         assert stop is None or isinstance(stop, Stop)

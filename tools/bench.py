@@ -48,8 +48,8 @@ class Row:
     goal: str
 
 
-class _Nobody:
-    """Telemetry off, and nobody who stops the run."""
+class _NoTelemetry:
+    """Telemetry off, and a stop that is never requested."""
 
     requested = False
 
@@ -69,10 +69,10 @@ def _line_factor(rig: Rig, *, telemetry: bool, seconds: float = 20.0) -> float:
     """Device time over CPU time of the whole loop, in virtual time."""
     line, _ = assemble(rig, SimulatedClock(), [], in_line=True)
     if not telemetry:
-        line = replace(line, telemetry=_Nobody())
+        line = replace(line, telemetry=_NoTelemetry())
     with line.backend:
         began = time.process_time()
-        loop.run(line, seconds, _Nobody())
+        loop.run(line, seconds, _NoTelemetry())
         return seconds / (time.process_time() - began)
 
 

@@ -156,7 +156,7 @@ def _c_run(program: Path, rate: float, seconds: float) -> NDArray[np.float64]:
 
 
 def _our_run(rate: float, seconds: float, *, record: bool) -> NDArray[np.float64]:
-    """Run in a fresh process, as anybody would."""
+    """Run in a fresh process, as a user does."""
     code = f"from tools.bench_lateness import child; child({rate}, {seconds}, {record})"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)  # noqa: S603 - our own
     return _us(done.stdout)
@@ -202,7 +202,7 @@ def child(rate: float, seconds: float, record: bool) -> None:
 
 
 class _Wire:
-    """A link to a board in this process; whatever the board does is taken out of each period's time."""
+    """A link to a board in this process; the time of the board is taken out of each period's."""
 
     name = "wire"
     pending = False
@@ -240,7 +240,7 @@ class _Wire:
         return self._frames.popleft() if self._frames else None
 
 
-class _Nobody:
+class _NoTelemetry:
     requested = False
 
 
@@ -258,7 +258,7 @@ def period_us(seconds: float = 10.0) -> float:
         handshake = len(wire.periods)
         gc.disable()
         try:
-            loop.run(line, seconds, _Nobody())
+            loop.run(line, seconds, _NoTelemetry())
         finally:
             gc.enable()
         return 1e6 * statistics.median(wire.periods[handshake + 1000 :])

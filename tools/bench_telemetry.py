@@ -41,7 +41,7 @@ class Endurance:
 
 
 def everything(rig: Rig, folder: Path) -> list[SinkMaker]:
-    """Return who looks on at most: the run's own recording, the dashboard in a file and served."""
+    """Return as many sinks as a run can have: its recording, the dashboard in a file and served."""
     port = free_port(_PORT)
     if port is None:
         raise OSError(f"no free port from {_PORT} on")

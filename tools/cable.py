@@ -32,7 +32,7 @@ class Cable:
             tty.setraw(end)
         os.set_blocking(self._host, False)
         self.port = os.ttyname(self._socket)
-        self._hand, self._wish = os.pipe()  # whoever pulls
+        self._hand, self._wish = os.pipe()  # its write end pulls the cable
         self._loose = self._pulled = False
         self._thread = threading.Thread(target=self._carry, name="cable", daemon=True)
 
@@ -44,7 +44,7 @@ class Cable:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Pull it, if nobody has."""
+        """Pull the cable, unless it is pulled already."""
         self.pull()
 
     def loosen(self) -> None:

@@ -47,7 +47,7 @@ class Death(NamedTuple):
     fault: str  # what the device says it was
     exit_code: int  # of the host
     doubt_us: int  # by which both may be less
-    stayed_off: bool  # until the end, whatever the host did
+    stayed_off: bool  # until the end, for anything that the host did
     tries: int  # hosts that were started for it: one that was late by itself, or ill timed, does not count
 
     @property

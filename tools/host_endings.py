@@ -118,7 +118,7 @@ class Ending(NamedTuple):
     said: str  # the last line on stderr
     doubt_us: int  # by which off_us may be less
     waited_us: int  # of off_us: ready to run, and its computer ran something else
-    pressed_s: float  # of gone_s: somebody was ready to run on that computer and was not let
+    pressed_s: float  # of gone_s: a process was ready to run on that computer and had to wait
     tries: int
 
     @property
@@ -207,7 +207,7 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
 
 
 def _pressed_us() -> int:
-    """Return how long somebody here was ready to run and was not let, in all; 0 where nobody counts."""
+    """Return how long processes were ready to run here and had to wait, in all; 0 where it is not counted."""
     try:
         text = Path("/proc/pressure/cpu").read_text("utf-8")
     except OSError:

@@ -95,7 +95,7 @@ def main() -> int:
     config = {name: int(value) for name, value in (field.split("=", 1) for field in asked.fields)}
     plant = socket.socket(fileno=asked.plant_fd)
     (board_host, host_end), (board_plant, plant_end) = socket.socketpair(), socket.socketpair()
-    master, slave = pty.openpty()  # the other end stays open: a UART does not see whether anybody is there
+    master, slave = pty.openpty()  # the other end stays open: a UART does not see whether it is connected
     tty.setraw(slave)
     with tempfile.TemporaryDirectory() as folder:
         kept = Path(folder) / "record.bin"

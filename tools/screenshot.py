@@ -42,7 +42,7 @@ class Seen:
 
     @property
     def complaints(self) -> list[str]:
-        """Whatever a view or the viewer itself did not like."""
+        """The problems that a view or the viewer itself reported."""
         reports = [f"{v.name}: {r.summary}" for v in self.state.views for r in v.reports]
         return reports + [f"{e.level} {e.target}: {e.message}" for e in self.logs if _is_complaint(e)]
 

@@ -207,11 +207,11 @@ def test_stop_is_a_word_that_the_loop_takes_in_the_period(by: int, said: str) ->
 )
 def test_stop_tells_the_last_words(number: int, end: End, said: str) -> None:
     mailbox = Mailbox()
-    mailbox.tell_end("Amplifier somewhere.", number)
+    mailbox.tell_end("Amplifier at some voltage.", number)
     stopped = stop_run(os.getpid(), mailbox, lambda: True)
     assert stopped.end is end
     assert stopped.said.startswith(said)
-    assert stopped.said.endswith("Amplifier somewhere.")
+    assert stopped.said.endswith("Amplifier at some voltage.")
 
 
 def test_stop_goes_from_word_to_signals_and_says_what_ended_the_run() -> None:

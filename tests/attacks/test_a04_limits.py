@@ -6,7 +6,7 @@ delayed), limits from 0.5 to 20 rad/s, arms that start anywhere.
 Promise: when the voltage becomes 0, the simulated arm is no faster than `most_speed` says, once by the
 host's own watch alone (the plain simulated rig has no firmware) and once by the device alone
 (`monitors = "finite"`): at 2 rad/s and 4096 counts 2.6 rad/s and 3 rad/s. What gravity adds afterwards is
-measured by `make limits`. No healthy arm, wherever it starts, is stopped before it has passed a limit.
+measured by `make limits`. No healthy arm is stopped before it has passed a limit, from any start.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A8: a fault that the device keeps is not cleared by whatever starts next.
+"""A8: a fault that the device keeps is not cleared by the next start.
 
 What attacks: a restart loop, or a colleague who starts a run without a look. What is promised: every latched
 fault is named at the start that clears it; STOP by a person, the amplifier's own protection, what the board
@@ -144,7 +144,7 @@ def test_past_of_a_device_is_told_at_every_start() -> None:
         (History(0, 99, 200, -1), "boot 0, reset by cause 99, fault before that: code 200 (detail -1)"),
     ],
 )
-def test_past_is_a_sentence_whatever_a_device_says(past: History, sentence: str) -> None:
+def test_past_is_a_sentence_for_any_report_of_a_device(past: History, sentence: str) -> None:
     assert past.sentence == sentence
 
 

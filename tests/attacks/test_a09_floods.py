@@ -1,6 +1,6 @@
 """A9: floods of connections, requests and bytes against the panel and the control socket of a run.
 
-The panel answers STOP within a second whatever else is sent to it; its log and memory stay small. Every
+The panel answers STOP within a second under any other requests; its log and memory stay small. Every
 request that is odd gets a 4xx or a closed connection, never a traceback. A STOP that waited for more than a
 second is not acted on, and the page says that it was not confirmed.
 """

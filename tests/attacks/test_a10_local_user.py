@@ -1,8 +1,8 @@
 """A10: another user of this computer, who reads the dashboard, pushes into it, or knocks at a run's socket.
 
-Rerun's server asks nobody who they are, so a run ends its serving as soon as another user is connected, and
-what is pushed into the server reaches no file of the run. Sockets and their folder are this user's alone, and
-the kernel is asked who is at the other end.
+Rerun's server does not authenticate its clients, so a run ends its serving as soon as another user is
+connected, and what is pushed into the server reaches no file of the run. Sockets and their folder are this
+user's alone, and the kernel is asked who is at the other end.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-_NOBODY = 65_534
+_OTHER_USER_ID = 65_534
 _FORGED = "FORGED: the arm is at 0 V, safe to touch"
 _PUSHES = """
 import sys
@@ -72,13 +72,13 @@ def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-def _as_nobody(code: str, *arguments: str) -> subprocess.Popen[str]:
+def _as_another_user(code: str, *arguments: str) -> subprocess.Popen[str]:
     """Run a few lines as another user, who sees no file of this checkout."""
     if os.geteuid() != 0:
         pytest.skip("this test needs another user's process: as root")
     return subprocess.Popen(
         ["/usr/bin/env", "python3", "-I", "-S", "-c", code, *arguments],
-        user=_NOBODY, cwd="/", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        user=_OTHER_USER_ID, cwd="/", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
 
 
@@ -125,18 +125,20 @@ def test_a_dashboard_is_served_no_more_where_another_user_is_connected() -> None
     port, first = sink.port, blocks(3000)
     sink.block(first[0])
     assert sink.warnings == []
-    with _as_nobody(_CONNECTS, str(port)) as other:
+    with _as_another_user(_CONNECTS, str(port)) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "connected\n"
         for block in first[1:5]:
             sink.block(block)
-        assert [f"number {_NOBODY}" in one and "served any more" in one for one in sink.warnings] == [True]
+        assert [f"number {_OTHER_USER_ID}" in one and "served any more" in one for one in sink.warnings] == [
+            True
+        ]
         until(lambda: not answers(port, 0.1), "the server ended")
         other.kill()
     sink.close()
 
 
-def test_this_user_s_own_viewers_are_nobody_s_business() -> None:
+def test_this_user_s_own_viewers_are_left_alone() -> None:
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         server.listen()
@@ -151,11 +153,11 @@ def test_sockets_are_this_user_s_alone_and_the_kernel_says_who_knocks(tmp_path: 
         place = socket_of(run.pid)
         assert stat.S_IMODE(place.stat().st_mode) & 0o077 == 0
         assert stat.S_IMODE(folder().stat().st_mode) == 0o700
-        with _as_nobody(_KNOCKS, str(place)) as refused:
+        with _as_another_user(_KNOCKS, str(place)) as refused:
             assert refused.communicate(timeout=BOUND)[0] == "PermissionError\n"
         for path in (place.parents[1], place.parent, place):  # as if every mode were wrong
             path.chmod(0o777)
-        with _as_nobody(_KNOCKS, str(place)) as unanswered:
+        with _as_another_user(_KNOCKS, str(place)) as unanswered:
             said = unanswered.communicate(timeout=BOUND)[0]
         assert said in {"answer b''\n", "ConnectionResetError\n", "BrokenPipeError\n"}
         for path in (place.parents[1], place.parent):

@@ -1,4 +1,4 @@
-"""A11. Who attacks: the author of a recording that somebody else opens.
+"""A11. Who attacks: the author of a recording that another person opens.
 
 What is promised: every file is answered by a sentence and a documented exit code, with at most 500 MB of
 memory and in seconds; no control character of a file reaches the terminal as it is.

@@ -1,7 +1,7 @@
 """A12, files. Who attacks: a user in a hurry, who names a file that matters as the place of an output.
 
 What is promised: what is there is overwritten with --force alone; the rig that is run, the recording that is
-read, and the file of a reference never are, by whatever name.
+read, and the file of a reference never are, by none of their names.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _LOCKED = {"BDTR": 0x7FFF, "CR2": 0x0300, "CCER": 0x0002, "CCMR1_Output": 0x0070}
-"""Registers of TIM1, and bits of them that nobody may change: break, lock, idle state, polarity, mode."""
+"""Registers of TIM1, and bits of them that must not change: break, lock, idle state, polarity, mode."""
 
 
 def late_ticks(system: System) -> int:

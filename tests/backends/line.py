@@ -28,7 +28,7 @@ class Line:
     def say(self, words: bytes) -> None:
         try:
             os.write(self._master, words)
-        except BlockingIOError:  # nobody reads
+        except BlockingIOError:  # no reader
             return
 
     def heard(self) -> bytes:

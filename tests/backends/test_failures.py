@@ -51,7 +51,7 @@ def test_holder_names_the_other_process() -> None:
         os.close(slave)
 
 
-def test_holder_is_empty_when_nobody_else_has_it_or_it_is_not_there() -> None:
+def test_holder_is_empty_when_no_other_process_has_it_or_it_is_not_there() -> None:
     master, slave = os.openpty()
     assert holder(os.ttyname(slave)) == ""
     os.close(master)

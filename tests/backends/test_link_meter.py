@@ -60,7 +60,7 @@ def watch(*samples: SampleReport) -> TickWatch:
 
 
 @pytest.mark.parametrize("apart", [-100, -2, -1, 0, 1, 2, 50, 127])
-def test_two_devices_show_whatever_lies_between_their_ticks(apart: int) -> None:
+def test_two_devices_show_at_any_distance_of_their_ticks(apart: int) -> None:
     both = [one for k in range(20) for one in (sample(k), sample(k + apart, 5))]
     assert watch(*both).two_devices
 

@@ -173,7 +173,7 @@ def test_missing_driver_is_named_as_such(error: Exception, monkeypatch: pytest.M
     "error", [NameError("name 'canOpen' is not defined"), RuntimeError("a\nb"), KeyError()]
 )
 @pytest.mark.parametrize(("interface", "remedy"), [("kvaser", "its driver"), ("socketcan", "ip link set")])
-def test_whatever_a_driver_raises_is_one_line_with_its_own_remedy(
+def test_any_error_of_a_driver_is_one_line_with_its_own_remedy(
     interface: str, remedy: str, error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(can, "Bus", raising(error))

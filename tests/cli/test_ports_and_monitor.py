@@ -250,12 +250,12 @@ def test_ports_goes_on_where_a_driver_fails_in_looking(cli: Cli, monkeypatch: py
     def detect(interfaces: str) -> list[dict[str, str]]:
         if interfaces == "gs_usb":
             raise ValueError("no backend available")
-        return [{"interface": "virtual", "channel": "nobody"}] if interfaces == "pcan" else []
+        return [{"interface": "virtual", "channel": "vcan-test"}] if interfaces == "pcan" else []
 
     monkeypatch.setattr("can.detect_available_configs", detect)
     outcome = cli("ports")
     assert outcome.code == 0
-    assert "virtual nobody" in outcome.out
+    assert "virtual vcan-test" in outcome.out
 
 
 @pytest.mark.parametrize("arguments", [["--baud", "5"], ["--bitrate", "5"], [""], ["/dev/" + 200 * "x"]])

@@ -47,7 +47,7 @@ def test_run_equals_python_api_when_rig_is_the_same(cli: Cli) -> None:
     assert json.loads(outcome.out)["tracking_rms_rad"] == summary.tracking_rms_rad
 
 
-def test_run_leaves_figures_recording_and_picture_when_nobody_watches(cli: Cli, tmp_path: Path) -> None:
+def test_run_leaves_figures_recording_and_picture_without_a_viewer(cli: Cli, tmp_path: Path) -> None:
     outcome = cli("run", "--fast", "--duration", "1", "--note", "first light")
     (folder,) = (tmp_path / "runs").iterdir()
     assert outcome.code == 0

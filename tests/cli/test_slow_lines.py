@@ -98,7 +98,7 @@ def test_board_that_boots_when_its_port_is_opened_can_be_used(script: Callable[.
     assert "ended by" in done.out
 
 
-def test_samples_from_before_the_boot_mislead_nobody(cli: Cli) -> None:
+def test_samples_from_before_the_boot_are_ignored(cli: Cli) -> None:
     """What the line still carried is heard; then the board boots, silent, for a second and a half."""
     with device() as pump:
         hear, waking = pump.board.receive, threading.Timer(1.5, pump.silent.clear)

@@ -78,7 +78,7 @@ def test_no_serial_port_at_all(cli: Cli) -> None:
     assert "no serial port" in only_line(outcome)
 
 
-def test_serial_number_that_nobody_has(cli: Cli) -> None:
+def test_serial_number_that_no_adapter_has(cli: Cli) -> None:
     outcome = start(cli, "A10KZP45")
     assert outcome.code == 3
     assert "serial number" in only_line(outcome)
@@ -91,7 +91,7 @@ def test_busy_port(cli: Cli) -> None:
     assert "busy" in only_line(outcome)
 
 
-def test_nobody_answers(cli: Cli) -> None:
+def test_no_device_answers(cli: Cli) -> None:
     master, slave = os.openpty()
     outcome = start(cli, os.ttyname(slave))
     os.close(master)

@@ -87,7 +87,7 @@ def test_warnings_name_limit_when_csv_reference_leaves_it(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("kind", ["serial", "my_lab:Motor"])
-def test_check_warns_of_a_start_without_a_probe_wherever_a_motor_may_move(
+def test_check_warns_of_a_start_without_a_probe_for_every_backend_with_a_motor(
     script: Callable[..., Finished], tmp_path: Path, kind: str
 ) -> None:
     methods = "__enter__ = __exit__ = read = write = truth = None"

@@ -256,7 +256,7 @@ def mutated(draw: st.DrawFn) -> tuple[dict[str, Any], set[str]]:
 
 @settings(max_examples=2000, deadline=None, suppress_health_check=list(HealthCheck))
 @given(mutated())
-def test_load_gives_rig_or_config_error_whatever_the_table(case: tuple[dict[str, Any], set[str]]) -> None:
+def test_load_gives_rig_or_config_error_for_any_table(case: tuple[dict[str, Any], set[str]]) -> None:
     from pydantic import ValidationError
 
     from dcmp_hil.config.messages import explain_faults

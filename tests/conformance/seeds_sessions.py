@@ -238,7 +238,7 @@ SEEDS: dict[str, Row] = {
     "the period can be set": (change_seed(_any_parameter), "can", "parameters-read-only"),
     "a limit can be raised": (change_seed(_beyond), "can", "parameters-range"),
     "the watchdog's time can be raised": (change_seed(_longer_watchdog), "can", "parameters-range"),
-    "anyone may set parameters": (change_seed(_always("owner")), "can", "parameters-owner"),
+    "every session may set parameters": (change_seed(_always("owner")), "can", "parameters-owner"),
     "the wrong reason is answered": (change_seed(_reason_order), "can", "parameters-owner"),
     "parameters may be set in FAULT": (change_seed(_always("idle")), "can", "parameters-idle"),
     "parameters may be set in RUN": (change_seed(_always("idle")), "can", "parameters-in-run"),

@@ -56,7 +56,7 @@ class PtyPort:
         os.close(self._master)
 
     def _send(self, data: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):  # nobody reads
+        with contextlib.suppress(BlockingIOError):  # no reader
             os.write(self._master, data)
 
 

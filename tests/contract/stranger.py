@@ -1,4 +1,4 @@
-"""A device written from docs/protocol.md alone, by someone who has seen no line of the firmware."""
+"""A device written from docs/protocol.md alone, without a look at the firmware."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ class Cobs(Line):
             data = struct.pack("<H", identifier) + payload
             out += cobs_encode(data + struct.pack("<H", crc16(data))) + b"\0"
         if out and self._silent:
-            self._silent, out = False, b"\0" + out  # closes whatever came before
+            self._silent, out = False, b"\0" + out  # closes an unfinished frame before it
         return out
 
 

@@ -1,4 +1,4 @@
-"""One contract for every backend: what the loop may rely on, whatever is behind read and write."""
+"""One contract for every backend: what the loop may rely on, for every kind of read and write."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_nothing_is_seen_of_a_counter_that_wraps(kind: str, of_board: dict[str, 
 
 
 @wired
-def test_stop_from_anyone_trips_with_its_code(kind: str) -> None:
+def test_stop_from_any_host_trips_with_its_code(kind: str) -> None:
     with on_bench(kind) as bench, bench.device() as backend:
         drive(backend, 1.0, 5)
         bench.board.receive_frame(*pack(Stop(3)))
@@ -367,7 +367,7 @@ def test_host_that_slept_does_not_take_another_hosts_run_for_its_own(slept: int)
         first = SimBoardBackend(bench.rig, clock, bench.board)
         hosts.enter_context(first)
         drive(first, 1.0, 5)
-        for _ in range(slept):  # nobody answers: a fault, and the session lapses
+        for _ in range(slept):  # no host answers: a fault, and the session lapses
             bench.board.tick()
             bench.board.transmit_frames()  # lost: the sleeper's buffer is full
         assert bench.board.owner == 0
@@ -421,7 +421,7 @@ def test_ctrl_c_while_arming_leaves_nothing_armed(kind: str, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("kind", ["sim-board can", "stranger can"])
-def test_an_identity_that_answers_somebody_else_is_not_believed(kind: str) -> None:
+def test_an_identity_that_answers_another_host_is_not_believed(kind: str) -> None:
     """Another host's HELLO comes just before ours: its IDENTITY says owned, and means the other one."""
     with on_bench(kind) as bench:
         receive = bench.board.receive_frame

@@ -226,7 +226,7 @@ def test_hello_finds_an_owner(host: Callable[..., Host]) -> None:
 def test_ownership_ends_by_silence_or_release(ready: Host) -> None:
     for _ in range(490):
         ready.tick()
-    ready.drive(session=THEIRS)  # nobody's
+    ready.drive(session=THEIRS)  # no owner's
     ready.drive(back=4)  # too old
     assert ready.hello(THEIRS) == "b"
     assert ready.put(wire.TICK, 1)[0] == wire.READ_ONLY  # counts all the same
@@ -458,7 +458,7 @@ def test_watchdog_ends_arming_without_a_fault(ready: Host) -> None:
     assert states[-1] == IDLE
 
 
-def test_stop_is_obeyed_from_anyone_and_said_ten_times_a_second(running: Host) -> None:
+def test_stop_is_obeyed_from_every_host_and_said_ten_times_a_second(running: Host) -> None:
     running.run(3, 3000)
     running.send(wire.STOP, b"\x03")
     assert running.device.applied_mV == 0

@@ -98,15 +98,15 @@ def judge_plain(row: Row, seed: int) -> Verdict:
 
 def prepare(row: Row, seed: int, make: type[Board], *overrides: str) -> Bench:
     """Make rig, plan, board and oracle of a cell; everything about them follows from the seed."""
-    luck = random.Random(f"{row.name} {seed}")
+    rng = random.Random(f"{row.name} {seed}")
     fault = Fault.of(row.fault)
     drawn = not re.search("[:,]at=", row.fault)
     short = drawn and row.fault.startswith(_CARELESS)
     window, length = _SHORT if short else _WHOLE
     if drawn:
-        fault.at = luck.uniform(*window)
+        fault.at = rng.uniform(*window)
     arguments = _start(fault)
-    phase = f"sim.encoder_phase_counts={luck.random():.4f}"
+    phase = f"sim.encoder_phase_counts={rng.random():.4f}"
     zero = (arguments.get("count_offset", 0) + (1 << 23)) % (1 << 24) - (1 << 23)
     said = (*_RIG, phase, f"encoder.zero={zero}", *row.overrides, *overrides)
     again = load_rig("bench-1khz", said)
@@ -209,6 +209,6 @@ def start_again(bench: Bench, seed: int) -> tuple[str, ...]:
 @contextmanager
 def same_session(seed: int) -> Iterator[None]:
     """Let the host choose the same sessions every time: their bytes decide what a flipped bit does."""
-    luck = random.Random(seed)
-    with patch.object(secrets, "randbelow", luck.randrange):
+    rng = random.Random(seed)
+    with patch.object(secrets, "randbelow", rng.randrange):
         yield

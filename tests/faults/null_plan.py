@@ -23,17 +23,17 @@ _REFERENCES = (
 
 def healthy(seed: int) -> Verdict:
     """Run a healthy rig: encoder phase and noise, motor gain and reference follow from the seed."""
-    luck = random.Random(f"healthy {seed}")
+    rng = random.Random(f"healthy {seed}")
     rig = load_rig(
         "bench-1khz",
         (
             "backend.kind=sim-board",
             "encoder.zero=0",
             f"sim.seed={seed}",
-            f"sim.encoder_phase_counts={luck.random():.4f}",
-            f"sim.encoder_noise_counts={luck.uniform(0.0, 0.5):.4f}",
-            f"sim.plant.ku_rad_s2_V={_BELIEVED_KU * luck.uniform(0.6, 1.5):.4f}",
-            *luck.choice(_REFERENCES),
+            f"sim.encoder_phase_counts={rng.random():.4f}",
+            f"sim.encoder_noise_counts={rng.uniform(0.0, 0.5):.4f}",
+            f"sim.plant.ku_rad_s2_V={_BELIEVED_KU * rng.uniform(0.6, 1.5):.4f}",
+            *rng.choice(_REFERENCES),
         ),
     )
     oracle = Oracle()

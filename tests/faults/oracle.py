@@ -113,7 +113,7 @@ class Oracle(FaultListener):
             self._note(f"a command was accepted, and none of {self._drives} may be (tick {self._tick})")
         allowed = {self._voltage, 0, *(self._clamped(drive.voltage_mV) for drive in self._good)}
         if voltage not in allowed:
-            self._note(f"{voltage} mV put out, and nobody with a right to asked for it: {self._drives}")
+            self._note(f"{voltage} mV put out, and no host with a right to asked for it: {self._drives}")
 
     def _clamped(self, voltage_mV: int) -> int:
         return max(-self._limit_mV, min(self._limit_mV, voltage_mV))
@@ -122,7 +122,7 @@ class Oracle(FaultListener):
         left = self._state == State.FAULT and board.state not in (State.FAULT, State.BOOT)
         was_reset = self._sample is not None and self._sample.tick != (self._tick + 1) & 0xFF
         if left and not was_reset and not any(drive.clear and not drive.voltage_mV for drive in self._good):
-            self._note(f"the fault was left for state {board.state}, and nobody cleared it")
+            self._note(f"the fault was left for state {board.state}, and no host cleared it")
 
     def _look_at_plant(self, board: Board) -> None:
         position, velocity, _ = board.truth()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 FINE = frozenset({"completed"})
 SILENT = frozenset({"HOST_SILENT", "SampleTimeoutError"})
-"""Whoever of the two sees it first."""
+"""The error of the side that sees it first."""
 NUMBER = frozenset({"not_finite"})
 PUSHED = frozenset({"disturbance", "speed", "OVER_SPEED"})
 JUMPED = frozenset({"speed", "jump", "ENCODER_JUMP", "disturbance"})

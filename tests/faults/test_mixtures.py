@@ -1,4 +1,4 @@
-"""Several faults at once, drawn at random: whatever comes of it, the oracle has nothing to say."""
+"""Several faults at once, drawn at random: the oracle finds no violation."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ REASONS = {
 pytestmark = pytest.mark.usefixtures("untraced")
 
 
-def drawn(luck: random.Random) -> Fault:
+def drawn(rng: random.Random) -> Fault:
     """Draw a fault with parameters anywhere in their bounds, small ones as often as large ones."""
-    name = luck.choice([kind for kind in KINDS if kind != "firmware.start"])
+    name = rng.choice([kind for kind in KINDS if kind != "firmware.start"])
     params: dict[str, float | str] = {}
     for key, param in KINDS[name].params.items():
         if isinstance(param, Choice):
-            params[key] = luck.choice(param.words)
+            params[key] = rng.choice(param.words)
         else:
-            params[key] = min(param.high, max(param.low, param.default * 10 ** luck.uniform(-1.5, 1.5)))
-    at = "boot" if luck.random() < _FROM_BOOT else luck.uniform(0.0, 0.8)
-    return Fault(name, at, luck.uniform(0.001, 0.4), **params)
+            params[key] = min(param.high, max(param.low, param.default * 10 ** rng.uniform(-1.5, 1.5)))
+    at = "boot" if rng.random() < _FROM_BOOT else rng.uniform(0.0, 0.8)
+    return Fault(name, at, rng.uniform(0.001, 0.4), **params)
 
 
 def mixed(seed: int) -> tuple[str, list[str], list[str]]:
     """Run a mixture; return how it ended, what the oracle says, and what went wrong on purpose."""
-    luck = random.Random(f"mixture {seed}")
-    faults = [drawn(luck) for _ in range(luck.randrange(1, 5))]
+    rng = random.Random(f"mixture {seed}")
+    faults = [drawn(rng) for _ in range(rng.randrange(1, 5))]
     rig = bench("backend.kind=sim-board", "supervisor.start=immediate")
     oracle = Oracle()
     injector = FaultPlan(faults, seed).on(rig, oracle, Board(rig))

@@ -78,9 +78,9 @@ class PutsOutTooMuch(Board):
     ("make", "fault", "says"),
     [
         (TakesOldCommands, "wire.delay:ms=10,way=up", "a command was accepted"),
-        (TakesOldCommands, "wire.delay:ms=10,way=up", "nobody with a right to asked for it"),
+        (TakesOldCommands, "wire.delay:ms=10,way=up", "no host with a right to asked for it"),
         (HasNoWatchdog, "wire.blackhole:way=up", "ticks after the last good command"),
-        (ForgetsFaults, "firmware.stop", "nobody cleared it"),
+        (ForgetsFaults, "firmware.stop", "no host cleared it"),
         (StaysOn, "firmware.stop", "ENABLE True in state 4"),
         (PutsOutTooMuch, "firmware.stop", "10000 allowed"),
     ],

@@ -1,4 +1,4 @@
-"""Plans: text, bounds, times, luck, and where they may be used."""
+"""Plans: text, bounds, times, random numbers, and where they may be used."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_what_is_no_fault_is_refused_in_words() -> None:
         run(bench(BOARD), duration=0.1, fast=True, faults="wire.drp")
 
 
-def test_a_rig_is_the_same_object_whatever_goes_wrong() -> None:
+def test_a_rig_is_the_same_object_with_any_fault() -> None:
     rig = bench(BOARD, QUICK)
     before = pickle.dumps(rig)
     session = Session(rig, duration=0.1, fast=True, faults=["host.slow", "wire.drop"])
@@ -178,7 +178,7 @@ def test_a_seed_repeats_itself_to_the_bit_and_another_does_not(text: str) -> Non
     assert lost(3) == lost(3) != lost(4)
 
 
-def test_one_fault_more_leaves_the_luck_of_the_others_alone() -> None:
+def test_one_fault_more_leaves_the_random_numbers_of_the_others_alone() -> None:
     drop = Fault("wire.drop", p=0.1, way="down")
     assert lost_at(quick(drop)) == lost_at(quick(drop, Fault("plant.enc_noise")))
 

@@ -106,7 +106,7 @@ def test_healthy_rig_leaves_the_watch_room(overrides: tuple[str, ...], peak: flo
 
 
 def test_watch_judges_by_an_observer_of_its_own() -> None:
-    # Whatever the rig's own observer claims, the watch sees only sample and voltage.
+    # The watch sees only sample and voltage, and nothing of the rig's own observer.
     watch = DisturbanceWatch(SuperTwisting(setting(), mu0=100.0), setting(), 50.0)
 
     still = Estimate(0.0, 0.0, 0.0)

@@ -22,12 +22,12 @@ pytestmark = pytest.mark.usefixtures("untraced")
 
 
 @pytest.mark.parametrize("counts", [256, 360, 400, 500, 1000, 2500, 8192, 65_536])
-def test_healthy_run_ends_well_whatever_the_encoder(counts: int) -> None:
+def test_healthy_run_ends_well_with_any_encoder(counts: int) -> None:
     assert healthy(counts, 1000, seeds=3, duration=6.0) == {"well": 3}
 
 
 @pytest.mark.parametrize(("counts", "rate"), [(256, 200), (300, 5000), (5000, 200), (16_384, 3000)])
-def test_healthy_run_ends_well_whatever_the_rate(counts: int, rate: int) -> None:
+def test_healthy_run_ends_well_at_any_rate(counts: int, rate: int) -> None:
     assert healthy(counts, rate, seeds=1, duration=6.0) == {"well": 1}
 
 

@@ -1,4 +1,4 @@
-"""The lock is whole, and `make` installs exactly what it names: any pip, whatever the index has by now."""
+"""The lock is whole, and `make` installs exactly what it names: any pip, any newer versions in the index."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_lock_meets_what_the_project_declares() -> None:
 
 @pytest.mark.parametrize("python", PYTHONS)
 @pytest.mark.parametrize("lock", LOCKS)
-def test_lock_holds_whatever_its_packages_need(lock: str, python: str) -> None:
+def test_lock_holds_every_requirement_of_its_packages(lock: str, python: str) -> None:
     """What pip would have looked for by itself; it is told not to look."""
     held = {
         canonicalize_name(pin.requirement.name): pin

@@ -96,7 +96,7 @@ def test_change_that_was_not_taken_is_not_shown_as_applied(
     assert said["ok"] is False
     assert why in said["said"]
     assert {knob["key"]: knob["value"] for knob in state["knobs"]}["controller.kp_1_s2"] == 4000.0
-    assert rig.mailbox.take() is None or answer is not None  # withdrawn: nobody applies it later
+    assert rig.mailbox.take() is None or answer is not None  # withdrawn: it is not applied later
 
 
 def test_state_is_the_newest_period_in_numbers_and_words(rig: _Rig, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
     assert places.running() == []
 
 
-def test_run_says_why_nobody_listens_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
+def test_run_says_why_it_does_not_listen_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
     places.folder().chmod(0o755)
     with started(tmp_path, *_RUN) as run:
         assert run.stderr is not None
@@ -125,7 +125,7 @@ def test_run_says_why_nobody_listens_when_its_folder_is_not_its_own(tmp_path: Pa
     assert "is no folder of yours alone" in said
 
 
-def test_nobody_listens_when_that_is_wanted(tmp_path: Path) -> None:
+def test_run_does_not_listen_when_that_is_wanted(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN[:-4], "--duration", "0.5", "--no-control") as run:
         run.communicate(timeout=BOUND)
     assert run.returncode == 0

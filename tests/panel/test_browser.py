@@ -65,7 +65,7 @@ def _slide(page: Chrome, key: str, to: float) -> None:
 
 
 def _type(page: Chrome, key: str, text: str) -> None:
-    """Type over a number: all of it selected, for whatever has no focus is written by the page again."""
+    """Type over a number: all of it selected, for the page rewrites an input without focus."""
     control, a, tab = "\ue009", "a", "\ue004"
     _by(page, f"number-{key}").send_keys(control + a, "\ue000" + text + tab)
 

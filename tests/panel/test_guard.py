@@ -63,7 +63,7 @@ def test_token_is_exchanged_for_a_cookie_that_no_other_site_is_sent(page: _Page)
 @pytest.mark.parametrize(
     "path", ["/", "/events", "/panel.js", "/panel.css", "/nothing", "/?token=wrong", "/?token=%ff"]
 )
-def test_nobody_gets_in_without_the_token(page: _Page, path: str) -> None:
+def test_no_request_gets_in_without_the_token(page: _Page, path: str) -> None:
     for cookie in ("", "other=1", f"dcmp_hil_{page.port}=wrong"):
         status, text, headers = page.ask("GET", path, Cookie=cookie)
         assert status == 403

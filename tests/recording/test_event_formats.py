@@ -131,7 +131,7 @@ def test_phase_of_the_status_line_is_no_sentence() -> None:
 
 
 def test_no_program_reads_a_sentence() -> None:
-    """It is handed to people and to files for them, compared with nothing, and taken apart nowhere."""
+    """Sentences go to people and to files for them; no program compares or parses them."""
     shown = {"frames.py", "figures.py", "status.py", "layout.py", "apart.py"}
     for package in (dcmp_hil, sim_backend):
         for path in Path(package.__path__[0]).rglob("*.py"):

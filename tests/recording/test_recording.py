@@ -1,4 +1,4 @@
-"""A run's own recording: everything is in it, whatever cuts it off, and others can read it."""
+"""A run's own recording: everything is in it after any kind of end, and others can read it."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ while True:
 
 
 def _killed(folder: Path, rate: int) -> float:
-    """Write rows for half a second, kill whoever records them; return the age of the oldest one lost, s."""
+    """Write rows for half a second, kill the recording process; return the age of the oldest row lost, s."""
     import mmap
 
     capacity = 1 << 15

@@ -306,7 +306,7 @@ def test_stop_between_ticks_is_the_voltage_of_that_period() -> None:
     assert host.tick().voltage_mV == 0
 
 
-def test_what_nobody_fetches_is_counted_and_does_not_grow() -> None:
+def test_what_is_not_fetched_is_counted_and_does_not_grow() -> None:
     board = Board(bench(), carrier="cobs")
     for _ in range(1000):
         board.tick()

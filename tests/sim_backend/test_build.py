@@ -1,4 +1,4 @@
-"""Compiling the firmware for this computer: once, for everybody at once, and with a remedy where it fails."""
+"""Compiling the firmware for this computer: once for all processes, and with a remedy where it fails."""
 
 from __future__ import annotations
 

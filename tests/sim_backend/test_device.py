@@ -1,4 +1,4 @@
-"""The virtual device: a process behind a pseudo terminal, in plant time wherever that is possible."""
+"""The virtual device: a process behind a pseudo terminal, in plant time where that is possible."""
 
 from __future__ import annotations
 

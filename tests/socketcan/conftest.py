@@ -1,7 +1,7 @@
 """These tests are run in a machine whose kernel has CAN; here they are only reported.
 
 In the machine, as root, pytest runs them as it runs any other; every report is written down as it comes.
-On this side, whichever process needs the first of them starts the machine for all, and hands on what was
+On this side, the process that needs the first of them starts the machine for all, and passes on what was
 written.
 """
 

@@ -49,7 +49,7 @@ class Host:
         return " ".join(self._printed.read_text().split())
 
     def close(self) -> None:
-        """End it, whatever it does."""
+        """Kill the process, in any state."""
         self._process.kill()
         self._process.join()
         self._order.close()

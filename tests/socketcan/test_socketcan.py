@@ -24,7 +24,7 @@ BACKEND = 3  # exit code
 OFF_MS = WATCHDOG_MS + 5.0  # and a period
 CLASSES = [1 << bit for bit in range(10) if 1 << bit != BUS_OFF]
 TOLD = [b"sw096000\r", b"sp128000\r", b"e1a\r", b"e3bcs\r", b"e2oO\r", b"sa000000\r"]
-"""What an adapter says of its bus: warning, passive, nobody acknowledges, bad bits, overruns, all is well."""
+"""What an adapter says of its bus: warning, passive, no acknowledge, bad bits, overruns, all is well."""
 
 BOTH = pytest.mark.parametrize("kind", ["slcan", "vcan"])
 
@@ -129,7 +129,7 @@ def test_interface_that_is_not_there_is_refused_in_one_line(
     assert not caplog.records  # python-can has something to say
 
 
-def test_frames_are_dropped_without_waiting_when_nobody_takes_them(tmp_path: Path) -> None:
+def test_frames_are_dropped_without_waiting_when_none_is_read(tmp_path: Path) -> None:
     clock = MonotonicClock()
     with Bench(tmp_path, "slcan") as bench, raw_socket(bench.name) as other:
         link = CanLink(bench.settings, clock)

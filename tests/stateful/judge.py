@@ -10,7 +10,7 @@ from tests.faults.oracle import Oracle
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_REMEMBERED = 64  # pieces that reached the board, for somebody to say them again
+_REMEMBERED = 64  # pieces that reached the board, to be sent again
 
 
 class Judge(Oracle):
@@ -23,7 +23,7 @@ class Judge(Oracle):
         self._ticked = ticked
 
     def note(self, sentence: str) -> None:
-        """Add what somebody else found."""
+        """Add a violation that another part of the test found."""
         self._note(sentence)
 
     @property

@@ -60,14 +60,14 @@ class Machine(RuleBasedStateMachine):
 
     @rule(kind=st.sampled_from(sorted(FAULTS)), ticks=st.integers(1, 25))
     def fault(self, kind: str, ticks: int) -> None:
-        self.system.befall(kind, ticks)
+        self.system.inject_fault(kind, ticks)
 
     @rule(session=st.sampled_from([0, STRANGER]), wrong=st.booleans())
     def stranger_says_hello(self, session: int, wrong: bool) -> None:
         self.system.say(Hello(session, PROTOCOL_HASH ^ wrong))
 
     @rule(mV=st.integers(-32768, 32767), age=st.integers(-3, 12), arm=st.booleans(), own=st.booleans())
-    def somebody_drives(self, mV: int, age: int, arm: bool, own: bool) -> None:  # noqa: N803
+    def another_host_drives(self, mV: int, age: int, arm: bool, own: bool) -> None:  # noqa: N803
         session = self.system.board.owner if own else STRANGER
         self.system.alone(1)
         self.system.say(Drive(mV, self.system.seq(age), arm, False, False, session, 20))
@@ -81,7 +81,7 @@ class Machine(RuleBasedStateMachine):
             self.system.say(Drive(mV, seq, True, False, False, owner, 20))
 
     @rule(mV=st.sampled_from([0, 0, 1]), clear=st.booleans(), own=st.booleans())
-    def somebody_clears(self, mV: int, clear: bool, own: bool) -> None:  # noqa: N803
+    def another_host_clears(self, mV: int, clear: bool, own: bool) -> None:  # noqa: N803
         session = self.system.board.owner if own else STRANGER
         self.system.alone(1)
         self.system.say(Drive(mV, self.system.seq(), False, clear, False, session, 20))
@@ -125,7 +125,7 @@ class Machine(RuleBasedStateMachine):
     @precondition(lambda self: self.system.host is not None)
     @rule(volts=VOLTS)
     def careless_write(self, volts: float) -> None:
-        """Whoever writes past the supervisor cannot get a number that is none onto the wire."""
+        """A write past the supervisor cannot get a number that is none onto the wire."""
         assert self.system.host is not None
         backend = self.system.host.backend
         try:
@@ -165,11 +165,11 @@ class Machine(RuleBasedStateMachine):
 
     @precondition(lambda self: self.system.host is None)
     @rule(ticks=st.sampled_from([10, 30, 60, 505]))
-    def nobody_is_there(self, ticks: int) -> None:
+    def no_host_is_there(self, ticks: int) -> None:
         self.system.alone(ticks)
 
     def teardown(self) -> None:
-        """Whatever it was: remove it, and it runs again."""
+        """Remove every fault; then the system runs again."""
         if not self.system.violations:
             self.system.run_again()
         self.judged()

@@ -32,7 +32,7 @@ class Pair(NamedTuple):
     host: str = OFF
     line: tuple[Command, ...] = ()
     told: State | None = None  # a SAMPLE on its way
-    silent: int = 0  # periods since a command was accepted, whatever the device makes of it
+    silent: int = 0  # periods since a command was accepted, with any effect
 
 
 class Model:
@@ -160,7 +160,7 @@ def _output_violation(event: str, after: Pair) -> str | None:
     if (device.out or device.asked) and device.state != State.RUN:
         return "a voltage outside RUN"
     if device.state == State.RUN and event == "tick" and after.silent > SMALL.watchdog:
-        return "RUN, and nobody has been heard of"
+        return "RUN, and no host has been heard"
     return None
 
 
@@ -234,7 +234,7 @@ def stuck(model: Model, pairs: set[Pair]) -> Pair | None:
 
 def _reaches(model: Model, device: Device) -> bool:
     rules = model.rules
-    for _ in range(rules.watchdog + 2):  # whoever was there is silent, and his session lapses
+    for _ in range(rules.watchdog + 2):  # the host before is silent, and its session lapses
         device = rules.tick(device)
     device, host = rules.hello(rules.lapse(device), OURS), CLEARING
     for _ in range(_HEALTHY):

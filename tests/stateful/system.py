@@ -46,7 +46,7 @@ FAULTS = {
     "plant.enc_glitch": {"counts": 500, "times": 3},
     "plant.shove": {"rad_s2": 400.0},
 }
-"""What can befall it, by kind."""
+"""The faults that can be injected, by kind."""
 
 _TICKING = ("wire.unplug",)  # they do something in every tick
 _SEQ = 0x1FFF
@@ -84,7 +84,7 @@ class System:
     """
 
     def __init__(self, seed: int = 0, start: Start = Start()) -> None:  # noqa: B008 - it is immutable
-        self.clock, self.luck = SimulatedClock(), random.Random(seed)
+        self.clock, self.rng = SimulatedClock(), random.Random(seed)
         self.board = Board(
             rig_at(start.encoder), start_us=start.us, first_tick=start.tick, count_offset=start.encoder
         )
@@ -118,7 +118,7 @@ class System:
             return False
         backend = DeviceBackend(self.rig, self._plug_in(), self.clock)
         backend.clear = clear
-        with patch.object(secrets, "randbelow", self.luck.randrange):
+        with patch.object(secrets, "randbelow", self.rng.randrange):
             try:
                 backend.__enter__()
             except DcmpError as error:
@@ -161,7 +161,7 @@ class System:
         """Let the board go on while the host does nothing."""
         self._link.elapse(ticks)
 
-    def befall(self, kind: str, ticks: int) -> None:
+    def inject_fault(self, kind: str, ticks: int) -> None:
         """Switch a fault on for so long."""
         effect = self._effects[kind]
         self._ends[kind] = self.board.tick_count + ticks
@@ -170,11 +170,11 @@ class System:
             effect.begin()
 
     def say(self, message: Message) -> None:
-        """Let somebody on the line say something to the board."""
+        """Send a message to the board from another host on the line."""
         self.inject(cobs.encode(pack(message, 0)))
 
     def stop(self, reason: int) -> None:
-        """Let somebody say STOP, which has to be obeyed at once."""
+        """Send STOP from another host; it has to be obeyed at once."""
         self.inject(b"\0" + cobs.encode(pack(Stop(reason), 0)))
         board = self.board
         if board.state not in (State.BOOT, State.FAULT) or board.applied_mV or board.enable:
@@ -200,7 +200,7 @@ class System:
         for kind in tuple(self._ends):
             self._end(kind)
         self.board.link(up=True)
-        self.inject(b"\0")  # whatever was left on the line
+        self.inject(b"\0")  # ends an unfinished frame on the line
         self.alone(_LEASE)
         for _ in range(_PATIENCE):
             if self.board.truth().velocity == 0.0:

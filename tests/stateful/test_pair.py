@@ -42,7 +42,7 @@ class OldCommands(Rules):
 
 
 class Strangers(Rules):
-    """Takes a command of anybody."""
+    """Takes a command of every session."""
 
     def accepts(self, device: Device, command: Command) -> bool:
         return super().accepts(device, command._replace(session=device.owner))

@@ -59,7 +59,7 @@ IN_HOST = {
     "no ramp": _method(Supervisor, "_partial_voltage", lambda _, __, demand: demand),
     "no clamp": _method(Limits, "voltage", lambda _, __, demand, ___: demand),
     "NaN is let through": _method(Supervisor, "admit", _admit_nan),
-    "whatever the device says, it is well": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
+    "a fault of the device is not seen": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
     "no goodbye": _method(Goodbye, "run", lambda *_, **__: True),
 }
 
@@ -77,7 +77,7 @@ IN_FIRMWARE = {
         "case DCMP_GAP: dcmp_watchdog_feed(&device->watchdog, now_us, 20, 20);",
     ),
     "old commands are accepted": ("core/dcmp_session.c", "if (age > oldest) {", "if (age > oldest + 4u) {"),
-    "anybody may drive": (
+    "every session may drive": (
         "core/dcmp_session.c", "candidate != 0u && candidate == session->owner", "candidate != 0u",
     ),
     "the fault is left without its edge": (

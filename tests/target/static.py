@@ -180,7 +180,7 @@ def deviations(page: str) -> list[Deviation]:
 
 
 def judge(found: Iterable[Finding], rows: list[Deviation], version: str = "2.10") -> Iterator[str]:
-    """Yield every finding that nobody accounts for, and every deviation that nothing needs."""
+    """Yield every finding without a deviation, and every deviation without a finding."""
     idle = {row for row in rows if row.version == version}
     for finding in sorted(found):
         account = [

@@ -43,7 +43,7 @@ def test_silence_is_0_V_after_the_watchdog_and_a_tick(f405: Path, carrier: str) 
 @pytest.mark.parametrize("lsi_hz", [17_000.0, 32_000.0, 47_000.0])
 @pytest.mark.parametrize("stuck", ["tick", "link", "main"])
 def test_stuck_task_is_reset_by_the_chips_own_watchdog(f405: Path, stuck: str, lsi_hz: float) -> None:
-    """T08 and IWDG: whoever stops working, the motor is off within 50 ms, the board comes back disarmed."""
+    """T08 and IWDG: if any task stops, the motor is off within 50 ms, the board comes back disarmed."""
     with rung(f405, lsi_hz=lsi_hz) as target:
         target.drive(20)
         began = target.system.now_us
@@ -80,7 +80,7 @@ def test_bus_off_is_0_V_within_2_ms_and_comes_back_disarmed(f405: Path) -> None:
     assert any(number == 0x040 and data[6] & 7 == State.FAULT for number, data in frames)
 
 
-def test_frames_that_nobody_acknowledges_are_given_up(f405: Path) -> None:
+def test_frames_without_an_acknowledge_are_given_up(f405: Path) -> None:
     with rung(f405, "can") as target:
         target.system.can.on_sent = lambda _: False
         target.system.run_for(30_000.0)
@@ -123,7 +123,7 @@ def test_break_input_cuts_the_bridge_without_software(f405: Path) -> None:
         assert target.drive(5)[-1].fault == Fault.BREAK_INPUT
         assert not target.system.enable
         target.system.gpio["B"].outside |= 1 << BREAK_PIN
-        assert target.drive(5)[-1].fault == Fault.BREAK_INPUT  # until somebody clears it
+        assert target.drive(5)[-1].fault == Fault.BREAK_INPUT  # until a host clears it
         assert not target.system.enable
 
 

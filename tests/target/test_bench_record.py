@@ -72,7 +72,7 @@ def test_line_runs_at_the_rate_of_the_record(f405: Path, rate: int) -> None:
 
 
 def test_edges_are_stamped_with_their_time(f405: Path) -> None:
-    """The newest rising edge of A, by TIM5, whatever the interrupt does."""
+    """The newest rising edge of A, by TIM5, for any delay of the interrupt."""
     system = System(f405 / "bench_f405_dac.elf", image(record(CONFIG)))
     system.run_until(20_000.0)
     system.encoder.turn(0)

@@ -1,4 +1,4 @@
-"""A synthetic run for whoever looks on, and how to read a recording back."""
+"""A synthetic run for sinks, and how to read a recording back."""
 
 from __future__ import annotations
 

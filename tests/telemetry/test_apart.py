@@ -38,7 +38,7 @@ _HELD = Reference(0.0, 0.0, 0.0)
 
 
 class Notes:
-    """A sink that writes what it sees into a file, from whatever process it is in."""
+    """A sink that writes what it sees into a file, from any process."""
 
     def __init__(self, file: Path, warnings: tuple[str, ...] = ()) -> None:
         self._file = file
@@ -116,7 +116,7 @@ def noted(file: Path, what: str) -> list[str]:
 
 
 @pytest.fixture(autouse=True)
-def _nobody_stays() -> Iterator[None]:
+def _no_process_stays() -> Iterator[None]:
     before = set(children()), set(Path("/dev/shm").iterdir())  # noqa: S108 - to see that nothing is left there
     yield
     assert set(children()) <= before[0]
@@ -220,7 +220,7 @@ def test_a_run_ends_with_all_its_figures_when_the_process_does_not(number: signa
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_the_end_takes_two_seconds_at_most_whatever_the_process_does(number: signal.Signals) -> None:
+def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: signal.Signals) -> None:
     apart = Apart(Statistics(_T), keep=True)
     apart.open()
     fill(apart, 100)
@@ -249,7 +249,7 @@ def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.
     assert f"{apart.dropped} periods are in no figure" in told[0]
 
 
-def test_events_never_block_and_come_back_although_nobody_takes_them() -> None:
+def test_events_never_block_and_come_back_although_they_are_not_read() -> None:
     apart = Apart(Statistics(_T), keep=True)
     apart.open()
     assert apart.pid is not None
@@ -292,7 +292,7 @@ class Busy(Notes):
         """Note nothing."""
 
     def block(self, block: Block) -> None:  # noqa: ARG002
-        """Have everybody else in the process wait, as on a slow computer: C code gives nothing away."""
+        """Make every other thread wait, as on a slow computer: C code keeps the interpreter lock."""
         sum(range(150_000_000))
 
     def close(self) -> None:
@@ -364,7 +364,7 @@ def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
     with subprocess.Popen([sys.executable, "-c", _RUNS_ON, str(tmp_path)], stderr=subprocess.PIPE) as process:
         _wait(lambda: notes.exists() and len(noted(notes, "rows")) >= 5)
         process.send_signal(number)
-        process.communicate(timeout=_BOUND)  # until whoever holds its standard error has left, too
+        process.communicate(timeout=_BOUND)  # until every process with its standard error has ended, too
     pid = int(noted(notes, "pid")[0])
     _wait(lambda: not Path(f"/proc/{pid}").exists())
     assert noted(notes, "closed") == [""]

@@ -56,7 +56,7 @@ def test_without_delay_the_reference_is_the_row_s_own() -> None:
 def test_with_a_delay_it_is_that_of_the_row_before() -> None:
     trajectory = Trajectory()
     assert_reference(block_of(Aligner(trajectory, T), range(60), T))
-    assert trajectory.asked == [0.0]  # only the very first has nobody before it
+    assert trajectory.asked == [0.0]  # only the very first has none before it
 
 
 def test_after_lost_rows_the_trajectory_is_asked() -> None:

@@ -52,7 +52,7 @@ def _vulkan() -> None:
 
 
 class OpenWindow:
-    """A window that nobody closes."""
+    """A window that is not closed."""
 
     def poll(self) -> None:
         """Return nothing: it is still open."""
@@ -112,7 +112,7 @@ def test_a_recording_opens_right_without_a_click(tmp_path: Path) -> None:
 
 
 def _keep(picture: Path) -> None:
-    """Keep what was seen, for whoever looks at what CI made."""
+    """Keep what was seen among the reports of CI."""
     _REPORTS.mkdir(exist_ok=True)
     shutil.copyfile(picture, _REPORTS / f"dashboard-{picture.name}")
 

@@ -1,4 +1,4 @@
-"""A thread that may get stuck in Rerun without harm to anybody."""
+"""A thread that may get stuck in Rerun without harm to other threads."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_a_file_that_grows_slowly_is_waited_for(
     assert file.stat().st_size == 10
 
 
-def test_what_a_job_raised_reaches_whoever_comes_next() -> None:
+def test_what_a_job_raised_reaches_the_next_caller() -> None:
     way = outlet(Stream())
     way.do(lambda _: os.environ["NOT_THERE"])  # type: ignore[arg-type]
     with pytest.raises(KeyError):

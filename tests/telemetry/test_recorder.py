@@ -1,4 +1,4 @@
-"""The recorder: everything in order, a sink that raises or hangs harms nobody."""
+"""The recorder: everything in order, a sink that raises or hangs harms no other."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_recorder_does_not_wait_for_a_sink_that_hangs(monkeypatch: pytest.Monkey
     recorder = _recorder(stuck, in_line=False)
     _record(recorder, 10)
     assert stuck.inside.wait(30.0)
-    _record(recorder, 100, 10)  # nobody waits for the sink here either
+    _record(recorder, 100, 10)  # no wait for the sink here either
     recorder.close()
     assert not stuck.let_go.is_set()  # close() came back although the sink did not
     assert stuck.closed == 0
@@ -158,7 +158,7 @@ def test_recorder_counts_what_a_hanging_sink_kept_from_the_others(monkeypatch: p
     assert seen + dropped == total
 
 
-def test_recorder_overwrites_the_oldest_and_counts_when_nobody_drains(
+def test_recorder_overwrites_the_oldest_and_counts_when_not_drained(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "_CAPACITY", 64)

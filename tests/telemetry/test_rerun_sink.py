@@ -187,7 +187,7 @@ def test_spawn_without_a_display_warns_and_goes_on(tmp_path: Path) -> None:
     assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
 
 
-def test_connect_with_nobody_there_warns_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_connect_without_a_viewer_warns_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as free:
         free.bind((window.LOOPBACK, 0))
         monkeypatch.setattr(window, "PORT", free.getsockname()[1])
@@ -199,7 +199,7 @@ def test_connect_with_nobody_there_warns_and_goes_on(tmp_path: Path, monkeypatch
     assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
 
 
-def test_connect_to_somebody_who_accepts_and_says_nothing_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_connect_to_a_server_that_accepts_and_stays_silent_warns(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as mute:  # as a frozen viewer does
         mute.bind((window.LOOPBACK, 0))
         mute.listen()

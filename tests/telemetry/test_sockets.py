@@ -1,4 +1,4 @@
-"""In a network of its own, which leads nowhere: who listens, and who tries to get out."""
+"""In a network of its own without a route: which ports listen, and which connections are tried."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _alone(mode: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("mode", ["none", "connect", "serve", "web"])
-def test_nobody_listens_but_on_loopback_and_nobody_wants_out(mode: str) -> None:
+def test_listeners_are_on_loopback_only_and_no_connection_goes_out(mode: str) -> None:
     seen = _alone(mode)
     assert seen["code"] == 0
     assert {address for _, address in seen["sockets"]} <= _LOOPBACK

@@ -86,7 +86,7 @@ def frames(draw: st.DrawFn) -> Frame:
 
 
 def understood(frame: Frame) -> Message | None:
-    """Return the message in a frame, whichever node's; None if there is none or its crc8 is wrong."""
+    """Return the message in a frame of any node; None if there is none or its crc8 is wrong."""
     try:
         return unpack(frame, frame[0] & 0xF)
     except CorruptFrameError:

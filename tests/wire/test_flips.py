@@ -64,7 +64,7 @@ def _passed(carrier: Any, frame: Frame, bits: int) -> tuple[int, int]:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("bits", [1, 2])
 def test_can(name: str, bits: int) -> None:
-    """Identifier and payload: never a message, whichever node it would be for."""
+    """Identifier and payload: never a message, for any node."""
     for frame in _frames(name):
         assert understood(frame) is not None
         length = len(frame[1])

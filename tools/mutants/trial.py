@@ -96,12 +96,12 @@ class Trials:
                 signal.alarm(WALL_LIMIT_S)
                 following = tests[number + 1] if number + 1 < len(tests) else None
                 test.config.hook.pytest_runtest_protocol(item=test, nextitem=following)
-        except BaseException:  # noqa: BLE001  # whatever it was, a child must not go on as the parent
+        except BaseException:  # noqa: BLE001  # after any exception, a child must not go on as the parent
             os._exit(BROKEN)
         os._exit(SURVIVED)
 
     def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
-        """End with the first failure, before anybody takes the time to describe it."""
+        """End with the first failure, before pytest takes the time to describe it."""
         if call.excinfo is not None and not call.excinfo.errisinstance(pytest.skip.Exception):
             os._exit(KILLED)
 

@@ -91,7 +91,7 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
     folder
         Where the command is run.
     settings
-        Environment, besides a few that are handed on.
+        Environment, besides a few variables that are passed on.
 
     Raises
     ------
@@ -101,8 +101,8 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
         If the machine did not come to its end in time.
     """
     made = machine()
-    handed_on = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    exports = "".join(f"export {n}={shlex.quote(v)}\n" for n, v in {**handed_on, **settings}.items())
+    passed_on = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    exports = "".join(f"export {n}={shlex.quote(v)}\n" for n, v in {**passed_on, **settings}.items())
     script = f"cd {shlex.quote(str(folder))} || exit\n{exports}exec {shlex.join(command)}\n"
     (share / SCRIPT).write_text(script)
     (share / STATUS).unlink(missing_ok=True)

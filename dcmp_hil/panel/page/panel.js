@@ -40,7 +40,7 @@ function log(reply) {
 let serverClock = null; // [server_ms, performance.now() when it came]
 const serverNow = () => (serverClock ? serverClock[0] + performance.now() - serverClock[1] : undefined);
 
-let doubt = ""; // what the banner says of a STOP that nobody has confirmed
+let doubt = ""; // what the banner says of a STOP that is not confirmed
 
 function doubtStop(sentence) {
   doubt = sentence;

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Bang:
-    """Switches between two voltages, whatever the arm does."""
+    """Switches between two voltages, for any position of the arm."""
 
     def __init__(self, context: ControllerContext, volts: float = 10.0, every: int = 1) -> None:  # noqa: ARG002
         self._volts, self._every = volts, every

@@ -100,7 +100,7 @@ class Swallows(Good):
 
 
 class SwallowsForEver(Good):
-    """Tries again and again, whatever interrupts it."""
+    """Tries again and again, after any interruption."""
 
     def turn(self) -> None:
         while True:

@@ -61,7 +61,7 @@ def test_a_cut_knows_no_slew_and_is_forgotten(core: Core) -> None:
 
 
 @pytest.mark.parametrize("state", [1, 2, 4])
-def test_outside_run_no_command_is_applied_whoever_left_it(core: Core, state: int) -> None:
+def test_outside_run_no_old_command_is_applied(core: Core, state: int) -> None:
     bench = Bench(core)
     bench.go_to(state)
     bench.device.amplifier.target_mV = 9000

@@ -47,7 +47,7 @@ def test_it_waits_for_the_answer_to_the_newest_sample(core: Core) -> None:
 
     bench.hello()
     bench.tick()
-    assert not waits()  # nobody has armed it
+    assert not waits()  # no host has armed it
     assert bench.drive(arm=1, age=1)
     assert waits()  # ARMING, and that was the answer to the one before
     assert bench.drive(arm=1)
@@ -135,7 +135,7 @@ def test_only_the_owners(core: Core) -> None:
     assert bench.drive()
 
 
-def test_a_stop_is_no_drive_whatever_lies_behind_it(core: Core) -> None:
+def test_a_stop_is_no_drive_with_any_bytes_behind_it(core: Core) -> None:
     """A controller's buffer may hold the rest of a longer frame."""
     bench = Bench(core)
     bench.run()

@@ -124,7 +124,7 @@ def _lower_speed(bench: Bench, limit: int) -> None:
 
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_a_steady_speed_at_a_low_limit_is_borne(core: Core, direction: int) -> None:
-    """2 rad/s of 4096 counts, wherever the arm is between two counts; 15 % more is found."""
+    """2 rad/s of 4096 counts, at any position between two counts; 15 % more is found."""
     for phase in range(10):
         for share, code in [(1.0, 0), (1.15, OVER_SPEED)]:
             bench = Bench(core)

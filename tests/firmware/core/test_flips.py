@@ -163,7 +163,7 @@ def _ttl_may_be(changes: dict[int, tuple[int, int]]) -> bool:
 
 
 def test_no_two_flipped_bits_in_an_slcan_drive_make_one_that_is_accepted() -> None:
-    """For any DRIVE whatever: crc8 is linear, so the damage alone decides whether it passes."""
+    """For every DRIVE: crc8 is linear, so the damage alone decides whether it passes."""
     one = {old ^ new for old, new in STEPS}
     assert all(_syndrome((at, error)) for at in range(16) for error in range(1, 16))
     passing = {

@@ -1,4 +1,4 @@
-"""Whatever comes in, nothing arms and nothing drives; and the next good frame is understood."""
+"""After any garbage, nothing arms and nothing drives; and the next good frame is understood."""
 
 import random
 

@@ -73,7 +73,7 @@ def test_a_slew_that_the_board_was_built_with_can_be_lowered_only(core: Core) ->
 
 @pytest.mark.parametrize("built", [5, 6, 20, 49, 50])
 def test_the_watchdog_s_time_can_be_lowered_only(core: Core, built: int) -> None:
-    """Whatever is asked for, 0 V comes within what the board was built with and a tick."""
+    """For any requested time, 0 V comes within what the board was built with and a tick."""
     bench = Bench(core, watchdog_ms=built)
     bench.hello()
     for asked in (built + 1, 50, 51, TOP):
@@ -123,7 +123,7 @@ def test_the_first_reason_is_answered(core: Core) -> None:
 
 @pytest.mark.parametrize("way", ["release", "lease"])
 def test_what_a_session_changed_ends_with_it(core: Core, way: str) -> None:
-    """The board is as it was built, before anybody else owns it and after."""
+    """The board is as it was built, before the next session owns it and after."""
     bench = Bench(core, slew_mV_per_ms=200)
     bench.hello()
     for number, (low, _) in RANGES.items():

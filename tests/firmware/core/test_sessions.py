@@ -30,7 +30,7 @@ def test_a_second_host_changes_nothing(core: Core) -> None:
     assert bench.tick() == (5000, True)
 
 
-def test_stop_is_obeyed_from_anyone(core: Core) -> None:
+def test_stop_is_obeyed_from_every_host(core: Core) -> None:
     bench = Bench(core)
     bench.run()
     bench.send("STOP", reason=3)
@@ -110,7 +110,7 @@ def test_a_new_owner_finds_the_fault_as_it_was(core: Core) -> None:
     assert bench.sample["state"] == FAULT
 
 
-def test_nobody_has_no_lease_and_asks_for_none(core: Core) -> None:
+def test_no_owner_has_no_lease_and_asks_for_none(core: Core) -> None:
     session = core.new("struct dcmp_session *")
     for owner in (0, 1, 0xFFFF):
         session.owner = owner

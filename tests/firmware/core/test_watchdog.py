@@ -11,7 +11,7 @@ PERIODS = [100, 250, 1000, 1700, 3000]
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("start", [0, 0xFFFF0000, 0xFFFFFFFF, 0x7FFFF000])
 def test_silence_ends_in_zero_volts(core: Core, period: int, start: int) -> None:
-    """After the watchdog's time and at most one tick, whatever the host's phase."""
+    """After the watchdog's time and at most one tick, for any phase of the host."""
     device = core.new("struct dcmp_device *")
     phases = range(0, period, 50)
     for watchdog, ttl, phase in itertools.product([5, 20, 50], [5, 13, 50], phases):

@@ -49,7 +49,7 @@ class TargetBoard:
         self.carrier = carrier
         self.period_us = 1e6 * rig.period
         self.ticks = 0
-        self.turned: Callable[[float], int] | None = None  # the count, where somebody turns the arm by hand
+        self.turned: Callable[[float], int] | None = None  # the count, where a test turns the arm by hand
         self._frames: list[Frame] = []
         self.system.position = self._at_tick
         self.system.can.on_sent = self._heard

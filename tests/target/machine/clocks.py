@@ -26,7 +26,7 @@ class Rcc(Block):
         super().__init__(system)
 
     def reset_for(self, cause: str) -> None:
-        """Take the values of a reset; its cause stays until somebody takes note."""
+        """Take the values of a reset; its cause stays until the program clears it."""
         flags = 0 if cause == "power" else self.now["CSR"] & 0xFE00_0000
         self.reset()
         self.now["CSR"] = flags
@@ -180,12 +180,12 @@ class Flash(Block):
 
 
 class Iwdg(Block):
-    """The watchdog that nobody stops."""
+    """The watchdog that cannot be stopped."""
 
     NAME = "IWDG"
 
     def reset(self) -> None:
-        """Stand still until somebody starts it."""
+        """Stand still until the program starts it."""
         super().reset()
         self.running, self._open, self._fed_us = False, False, 0.0
         self.feeds = 0

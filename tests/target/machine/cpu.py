@@ -62,7 +62,7 @@ class Cpu:
         return min((self._level(number) for number in self.active), default=_IDLE)
 
     def next(self) -> int | None:
-        """Return the exception that would come now, whatever PRIMASK says."""
+        """Return the exception that would come now, for any PRIMASK."""
         ready = [n for n in self.pending if n < 16 or n - 16 in self.enabled]
         if not ready:
             return None

@@ -135,7 +135,7 @@ class Can(Block):
     TX, RX0, SCE = 19, 20, 22
 
     def __init__(self, system: System) -> None:
-        self.on_sent: Callable[[Frame], bool] = lambda _: True  # the bus; False: nobody acknowledges
+        self.on_sent: Callable[[Frame], bool] = lambda _: True  # the bus; False: no acknowledge
         super().__init__(system)
 
     def reset(self) -> None:

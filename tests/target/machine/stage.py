@@ -33,7 +33,7 @@ class Stage:
 
     @property
     def input_mV(self) -> float:
-        """What stands before the gate: full negative where nobody drives the DAC's pin."""
+        """What stands before the gate: full negative where the DAC's pin is not driven."""
         system = self._system
         if system.pwm.is_clocked():
             sign = -1.0 if system.gpio["B"].level(_DIRECTION) else 1.0

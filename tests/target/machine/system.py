@@ -36,7 +36,7 @@ STACK_TOP_OF_BOARD = 0x2000_1000
 _PERIPHERALS, _PRIVATE = 0x4000_0000, 0xE000_0000
 _WFI = b"\x30\xbf"
 _RETURNS = 8  # unicorn's number for the end of an exception
-_SLICE = 2000  # instructions at most before somebody looks at the time
+_SLICE = 2000  # instructions at most between two checks of the time
 
 
 class System:
@@ -158,7 +158,7 @@ class System:
         self.now_us += us
 
     def interrupt_now(self) -> None:
-        """Let somebody look where the next block begins; unicorn repeats what is stopped midway."""
+        """Ask for a check where the next block begins; unicorn repeats what is stopped midway."""
         self._look = True
 
     def pc(self) -> int:

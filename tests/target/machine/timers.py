@@ -158,7 +158,7 @@ class EncoderTimer(Timer):
         (self.raise_flag if step < 0 else self.drop_flag)("CR1", 4)
         for place in range(before, to, step):
             self._count += step
-            rising = place % 4 == (0 if step > 0 else 3)  # A goes up here, whichever way it turns
+            rising = place % 4 == (0 if step > 0 else 3)  # A goes up here, in both directions
             if rising and self.flag("CCER", 0):
                 self.capture(1, self._count)
 

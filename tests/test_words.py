@@ -1,0 +1,77 @@
+"""Plain English: vague words, in code and pages, stay below the rates of comparable projects."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_ROOT = Path(__file__).parents[1]
+_VAGUE = re.compile(
+    r"(?<![a-z])("
+    r"whoever|whomever|whatever|wherever|nobody|somebody|anybody|everybody|someone|anyone|everyone|somewhere"
+    r"|luck|luckily|lucky|befall|befalls|befallen|befell|lookers?[-_ ]on"
+    r"|(look|looks|looked|looking|hand|hands|handed|handing)[-_ \n]+on"
+    r")(?![a-z])",
+    re.IGNORECASE,
+)
+"""Words and phrases without a named subject; in identifiers (`hand_on`) as well."""
+
+_CODE_RATE = 0.1  # vague words in 1,000 lines, at most
+_PAGES_RATE = 1.0
+_CODE = {".py", ".c", ".h", ".cmake", ".ld", ".dbc", ".toml", ".html", ".js", ".css"}
+
+
+def _vague_words(text: str) -> list[str]:
+    """Return the vague words of a text, in order."""
+    return [found[0] for found in _VAGUE.finditer(text)]
+
+
+def _code() -> Iterator[Path]:
+    """Yield every source file but this one, which has the list."""
+    yield _ROOT / "pyproject.toml"
+    yield _ROOT / "Makefile"
+    for room in ("dcmp_hil", "sim_backend", "firmware", "tools", "tests"):
+        for path in sorted((_ROOT / room).rglob("*")):
+            if path.suffix in _CODE and path != Path(__file__):
+                yield path
+
+
+def _pages() -> Iterator[Path]:
+    """Yield every page in Markdown."""
+    yield from sorted(_ROOT.glob("*.md"))
+    for room in ("docs", "firmware", "dcmp_hil", "tests"):
+        yield from sorted((_ROOT / room).rglob("*.md"))
+
+
+@pytest.mark.parametrize(
+    ("files", "rate"), [(_code, _CODE_RATE), (_pages, _PAGES_RATE)], ids=["code", "pages"]
+)
+def test_vague_words_are_rare(files: Callable[[], Iterator[Path]], rate: float) -> None:
+    lines, found = 0, list[str]()
+    for path in files():
+        text = path.read_text("utf-8")
+        lines += text.count("\n")
+        found += [f"{path.relative_to(_ROOT)}: {word}" for word in _vague_words(text)]
+    assert lines > 2000
+    assert 1000 * len(found) <= rate * lines, found
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Whoever listens, and nobody else.", ["Whoever", "nobody"]),
+        ("def test_nobody_answers(", ["nobody"]),
+        ("rows are handed on\n", ["handed on"]),
+        ("a looker-on", ["looker-on"]),
+        ("_NOBODY = 0", ["NOBODY"]),
+        ("whichever is longer; plucked", []),
+    ],
+)
+def test_the_count_finds_vague_words(text: str, expected: list[str]) -> None:
+    assert _vague_words(text) == expected
