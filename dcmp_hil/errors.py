@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class DcmpError(Exception):
-    """Base of everything this package raises on purpose.
+    """Base class of the exceptions of this package.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class ConfigError(DcmpError):
 
 
 class BackendError(DcmpError):
-    """The device or the way to it failed."""
+    """The device, or the link to it, failed."""
 
     exit_code = 3
 
@@ -51,7 +51,7 @@ class OpenError(BackendError):
 
 
 class LinkError(BackendError):
-    """The link broke while it was in use."""
+    """The link broke during a run."""
 
 
 class SampleTimeoutError(BackendError):

@@ -27,11 +27,11 @@ class Faults(Protocol):
         ...
 
     def observer(self, observer: Observer) -> Observer:
-        """Return the observer with its faults around it."""
+        """Return the observer, wrapped so that its faults act."""
         ...
 
     def controller(self, controller: Controller) -> Controller:
-        """Return the controller with its faults around it."""
+        """Return the controller, wrapped so that its faults act."""
         ...
 
 

@@ -27,7 +27,7 @@ class Telemetry(Protocol):
     """A receiver of the loop's cycles; `record` must return at once."""
 
     def record(self, cycle: Cycle) -> None:
-        """Take one period."""
+        """Take the values of one cycle; must return at once."""
         ...
 
 

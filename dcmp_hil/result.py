@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What a run leaves behind.
+    """Result of a run: how it ended, its summary and its files.
 
     Parameters
     ----------

@@ -250,7 +250,7 @@ class Session:
         return self._apart.pid if self._apart else None
 
     def result(self) -> Result:
-        """Return what there is, complete or not."""
+        """Return the result so far, of a complete or an interrupted run."""
         return Result(
             rig=self.rig,
             summary=self._figures.statistics.summary(self._realtime_factor),

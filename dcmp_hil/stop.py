@@ -43,7 +43,7 @@ class Stop(NamedTuple):
 
 
 class Check(Protocol):
-    """One thing watched, every period."""
+    """Protocol of a safety check that is made in every cycle."""
 
     def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
         """Return why the run must stop; None if it may go on. Raises and calls back nothing."""

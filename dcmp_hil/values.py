@@ -25,7 +25,7 @@ class Fault(IntEnum):
 
 
 class Sample(NamedTuple):
-    """What the device measured at one instant."""
+    """Measurement of the device at one instant."""
 
     t: float  # s, device time since opening, unwrapped: lost samples show as a larger step
     position: float  # rad, unwrapped; 0 = hanging at rest
@@ -50,7 +50,7 @@ class Truth(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """Where the arm should be at one instant."""
+    """Desired position, velocity and acceleration at one instant."""
 
     position: float  # rad
     velocity: float  # rad/s
@@ -99,13 +99,13 @@ class EventKind(StrEnum):
 
 
 class PhaseData(NamedTuple):
-    """Of PHASE."""
+    """Data of an event of kind PHASE."""
 
     phase: str  # a value of `dcmp_hil.safety.supervisor.Phase`
 
 
 class ProbeData(NamedTuple):
-    """Of PROBE."""
+    """Data of an event of kind PROBE."""
 
     gain_rad_s2_V: float
     deviation_rad_s2_V: float
@@ -113,25 +113,25 @@ class ProbeData(NamedTuple):
 
 
 class LimitData(NamedTuple):
-    """Of LIMIT."""
+    """Data of an event of kind LIMIT."""
 
     limit: str  # reference, velocity, acceleration, way, voltage or slew
 
 
 class LinkData(NamedTuple):
-    """Of LINK."""
+    """Data of an event of kind LINK."""
 
     counters: Mapping[str, int]  # by the names of `dcmp_hil.telemetry.link`; without what was not told
 
 
 class ChangeData(NamedTuple):
-    """Of CHANGE."""
+    """Data of an event of kind CHANGE."""
 
     values: Mapping[str, float | str]  # new values by dotted key, to the bit
 
 
 class CauseData(NamedTuple):
-    """Of TRIP, DEADLINE and LINK_CONCERN."""
+    """Data of an event of kind TRIP, DEADLINE or LINK_CONCERN."""
 
     cause: str  # a word that stays the same from release to release
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Encoder:
-    """A quantiser.
+    """Quantises a position to encoder counts.
 
     Parameters
     ----------

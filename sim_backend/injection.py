@@ -10,19 +10,19 @@ if TYPE_CHECKING:
 
 
 class PlantFaults(Protocol):
-    """What goes wrong at the plant."""
+    """Protocol of faults at plant and encoder."""
 
     def plant(self, plant: Plant) -> Plant:
-        """Return the plant with its faults around it."""
+        """Return the plant, wrapped so that its faults act."""
         ...
 
     def encoder(self, encoder: Encoder) -> Encoder:
-        """Return the encoder with its faults around it."""
+        """Return the encoder, wrapped so that its faults act."""
         ...
 
 
 class _Healthy:
-    """Plant and encoder are as they were made."""
+    """No faults: plant and encoder are returned unchanged."""
 
     @staticmethod
     def plant(plant: Plant) -> Plant:

@@ -28,7 +28,7 @@ class Pacer:
         self._start_ns = clock.now_ns()
 
     def start(self) -> None:
-        """Make this instant that of tick 0."""
+        """Take the present instant as that of tick 0."""
         self._start_ns = self._clock.now_ns()
 
     def stretch(self, factor: float) -> None:

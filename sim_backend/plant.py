@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 class Plant(Protocol):
-    """What the backend asks of a plant."""
+    """Protocol of a simulated plant."""
 
     def advance(self, voltage: float) -> Truth:
         """Hold `voltage` (V) for one period and return the state at its end."""
         ...
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long."""
+        """Make one period of the plant `factor` times as long."""
         ...
 
 
@@ -69,7 +69,7 @@ class MoreauPlant:
         return Truth(x1, x2, (x2 - before) / h + self._f0 * before - self._ku * voltage)
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long."""
+        """Make one period of the plant `factor` times as long."""
         self._step *= factor
 
 
@@ -104,7 +104,7 @@ class EulerPlant:
         return Truth(x1, x2, now + (self._f0 - f0) * x2 + (ku - self._ku) * voltage)
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long."""
+        """Make one period of the plant `factor` times as long."""
         self._step *= factor
 
     def _disturbance(self, x1: float, x2: float, t: float) -> float:

@@ -54,7 +54,7 @@ class _NoTelemetry:
     requested = False
 
     def record(self, cycle: Cycle) -> None:
-        """Forget it."""
+        """Ignore the cycle: telemetry is off."""
 
 
 def _row(what: str, unit: str, goal: str, measure: Callable[[], float]) -> Row:

@@ -150,7 +150,7 @@ class _Between:
         return self._plant.advance(self._waiting.pop(0) + pushed)
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long."""
+        """Make one period of the plant `factor` times as long."""
         self._plant.stretch(factor)
 
 

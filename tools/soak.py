@@ -128,11 +128,11 @@ class _Rows:
         self.rows: list[NDArray[np.float64]] = []
 
     def block(self, block: Block) -> None:
-        """Keep them."""
+        """Keep a copy of the block's rows."""
         self.rows.append(block.rows.copy())
 
     def event(self, event: Event) -> None:
-        """Forget it."""
+        """Ignore the event."""
 
     def close(self) -> None:
         """Nothing to finish."""

@@ -19,7 +19,7 @@ _MEGA = 1e-6
 
 
 class Kept(NamedTuple):
-    """What of a run is in its recording.
+    """The kept recording of a run: its file and completeness.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Kept(NamedTuple):
     why: str
 
     def document(self) -> dict[str, Any]:
-        """Return it for `--json`."""
+        """Return the kept files as a document for `--json`."""
         return self._asdict()
 
 

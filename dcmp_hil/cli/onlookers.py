@@ -78,7 +78,7 @@ class _Replacing:
 
     @property
     def warnings(self) -> Sequence[str]:
-        """What the sink goes on without."""
+        """Messages about parts that the sink works without."""
         warnings: Sequence[str] = getattr(self._sink, "warnings", ())
         return warnings
 

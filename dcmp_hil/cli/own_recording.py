@@ -37,7 +37,7 @@ _MAY_CHANGE = ("observer", "controller", "model")
 def write_exports(
     file: Path, *, csv: Path | None, parquet: Path | None, rrd: Path | None, force: bool
 ) -> None:
-    """Write what was asked for.
+    """Write the exports that the command line asks for.
 
     Raises
     ------

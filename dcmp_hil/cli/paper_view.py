@@ -67,7 +67,7 @@ def reproduction_table(reproduction: Reproduction) -> Table:
 
 
 def misprint_table(reproduction: Reproduction) -> Table:
-    """Lay out what each misprint costs."""
+    """Return a table of the error that each misprint causes."""
     table = _table("The misprints: what each costs")
     table.add_column("misprint → meant", no_wrap=True)
     table.add_column("quantity", no_wrap=True)

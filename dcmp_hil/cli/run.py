@@ -13,7 +13,7 @@ from dcmp_hil.common.printable_text import readable
 
 
 class Viewer(StrEnum):
-    """What shows the run."""
+    """The choices of `--viewer`."""
 
     SPAWN = "spawn"
     WEB = "web"

@@ -83,7 +83,7 @@ class RunFolder:
         return [sentence for sentence in missing if sentence]
 
     def _kept(self, name: str, write: Callable[[Path], None]) -> str:
-        """Write one file; return what went wrong."""
+        """Write one file of the run; return the error message, empty if there is none."""
         try:
             write(self.path / name)
         except Exception as error:  # noqa: BLE001 - a file that is missing must not cost another one

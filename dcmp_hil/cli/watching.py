@@ -71,7 +71,7 @@ class _WithPages:
         self._sink.event(event)
 
     def close(self) -> None:
-        """End the pages, and write what is left."""
+        """Stop serving pages, and close the sink."""
         self._pages.close()  # first: the other may take its time, and this process may be ended meanwhile
         self._sink.close()
 

@@ -14,7 +14,7 @@ _SHOWN = {
 
 
 def readable(text: str) -> str:
-    """Return text that every UTF-8 file takes.
+    """Return text without surrogates, which can be encoded in UTF-8.
 
     In a locale that knows ASCII alone, Python keeps the other bytes of an argument as surrogates, which
     cannot be written; they are the UTF-8 of what was typed.

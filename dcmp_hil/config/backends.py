@@ -15,7 +15,7 @@ _PAIR_CAN = 270  # the longest pair of classic frames, stuff bits and all
 
 
 class Capacity(NamedTuple):
-    """What a link carries, and what one period needs of it."""
+    """Rate of a link, and how many bits one cycle needs."""
 
     key: str  # of [backend], that sets it
     bits_per_second: int
@@ -32,7 +32,7 @@ class Traits:
 
     @property
     def capacity(self) -> Capacity | None:
-        """What the link carries; None if that is no limit."""
+        """Rate of the link, and what one cycle needs of it; None if the rate is no limit."""
         return None
 
 
@@ -45,7 +45,7 @@ class Sim(Traits, Section):
 
 
 class Device(Traits, Section):
-    """What every device on the wire is told."""
+    """Settings common to all backends with a device on a wire."""
 
     device: ClassVar[bool] = True
     node: Annotated[int, Field(ge=0, le=15)] = 0
@@ -82,7 +82,7 @@ class Serial(Device):
 
     @property
     def capacity(self) -> Capacity | None:
-        """The line's."""
+        """Rate of the serial line, and what one cycle needs of it."""
         return Capacity("baud", self.baud, _PAIR_COBS)
 
 
@@ -104,7 +104,7 @@ class Can(Device):
 
     @property
     def capacity(self) -> Capacity | None:
-        """The bus's, or that of the serial line to it."""
+        """Rate of the bus or of the serial line to its adapter; None for a virtual bus."""
         if self.interface == "virtual":
             return None
         if self.interface == "slcan":

@@ -82,7 +82,7 @@ def _by_rule(name: str, rig: Rig) -> str:
 
 
 def warnings(rig: Rig) -> list[str]:
-    """Name what is allowed and yet seldom meant."""
+    """Return warnings of settings that are valid and rarely intended."""
     rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start, _signs)
     return [sentence for rule in rules if (sentence := rule(rig))] + beyond_reach(rig)
 

@@ -161,7 +161,7 @@ def _read(source: str | Path) -> tuple[str, str, Path]:
 
 
 def shipped_text(name: str) -> str:
-    """Return a shipped rig as it is written.
+    """Return the text of a shipped rig.
 
     Raises
     ------

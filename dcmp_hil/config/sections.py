@@ -35,7 +35,7 @@ class EncoderSection(Section):
 
     @property
     def counts(self) -> float | None:
-        """Counts a revolution; None for an ideal encoder."""
+        """Counts per revolution; None for an ideal encoder."""
         return None if self.counts_per_rev == "ideal" else float(self.counts_per_rev)
 
     @property

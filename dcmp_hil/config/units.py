@@ -45,5 +45,5 @@ def unit_named(text: str) -> str:
 
 
 def in_words(unit: str) -> str:
-    """Write a key's unit as people do."""
+    """Return the unit of a key in its usual spelling, such as rad/s."""
     return _WORDS.get(unit) or unit.replace("_", "/")

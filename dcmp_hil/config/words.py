@@ -24,7 +24,7 @@ def number(value: float) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """Write a value as TOML would, shortened."""
+    """Return a value in TOML's syntax, shortened."""
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, str):
@@ -84,7 +84,7 @@ def _shortened(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Quote text as TOML does."""
+    """Return text as a quoted TOML string."""
     return '"' + "".join(_ESCAPES.get(char) or _visible(char) for char in text) + '"'
 
 

@@ -100,7 +100,7 @@ class Client(Listener):
         return session
 
     def another_session(self) -> int:
-        """Return a session that was not used yet."""
+        """Return a session number that has not been used yet."""
         while (session := secrets.randbelow(SESSIONS) + 1) in self.sessions:
             pass
         return session
@@ -110,7 +110,7 @@ class Client(Listener):
         return self.ask(ParameterGet(parameter), ParameterValue, lambda value: value.id == parameter)
 
     def value(self, parameter: int) -> int:
-        """Read a parameter that every device has.
+        """Return the value of a parameter that every device has.
 
         Raises
         ------

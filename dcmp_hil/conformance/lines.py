@@ -29,27 +29,27 @@ class Port(Protocol):
     name: str
 
     def read(self, timeout: float) -> bytes:
-        """Return what is there; wait up to `timeout` (s) if there is nothing."""
+        """Return the bytes received; wait up to `timeout` (s) if there are none."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send bytes; what finds no room is lost."""
+        """Send bytes; drop those that do not fit into the output buffer."""
         ...
 
     def close(self) -> None:
-        """Close it."""
+        """Close the port."""
         ...
 
 
 class Line(Protocol):
-    """A carrier."""
+    """A line to a device: frames over a port or a bus."""
 
     name: str
     carrier: str
 
     @property
     def damaged(self) -> int:
-        """What came so far and was no frame."""
+        """Number of corrupt frames received so far."""
         ...
 
     def send(self, frame: Frame) -> None:
@@ -61,12 +61,12 @@ class Line(Protocol):
         ...
 
     def close(self) -> None:
-        """Close it."""
+        """Close the port under the line."""
         ...
 
 
 class SerialPort:
-    """A serial port, opened by this process alone.
+    """A serial port, opened for exclusive use.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class SerialPort:
         self._poll.register(self._serial.fileno(), select.POLLIN)
 
     def read(self, timeout: float) -> bytes:
-        """Return what is there.
+        """Return the bytes received; wait up to `timeout` (s) if there are none.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class CobsLine:
 
     @property
     def damaged(self) -> int:
-        """What came so far and was no frame."""
+        """Number of corrupt frames received so far."""
         return self._receiver.corrupt
 
     def send(self, frame: Frame) -> None:

@@ -45,7 +45,7 @@ class Seen(NamedTuple):
 
 
 class Listener:
-    """What a device says, with whole ticks.
+    """Receives a device's messages and extends their ticks to whole numbers.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class Listener:
         return self.samples[-1]
 
     def drain(self) -> None:
-        """Take what waits already."""
+        """Read every message that has arrived already."""
         for _ in range(_BURST):
             before = len(self.heard)
             if self.take(0.0) is None and len(self.heard) == before:

@@ -24,7 +24,7 @@ _LIVE = (State.ARMING, State.RUN)
 
 
 def run_checks(client: Client, checks: Sequence[Check], *, armed: bool, clear: bool) -> Iterator[Outcome]:
-    """Run checks and yield what comes of each.
+    """Run checks in order and yield the outcome of each.
 
     Parameters
     ----------

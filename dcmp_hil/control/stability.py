@@ -38,7 +38,7 @@ _UNMODELLED = 1.1  # simulated variation over that of the linear loop, within 4 
 
 
 class LoopSpec(NamedTuple):
-    """All that the linear loop depends on.
+    """Parameters of the linear loop whose stability is judged.
 
     Parameters
     ----------

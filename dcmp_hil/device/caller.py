@@ -43,7 +43,7 @@ class _Owed(NamedTuple):
 
 
 class Caller:
-    """One side of a conversation with one device.
+    """The host's side of a request and answer exchange with one device.
 
     Answers carry no number. A question of a kind is asked again only when the answers to those before have
     come, or can come no more: no answer is taken for that to another question.
@@ -194,7 +194,7 @@ class Caller:
         return message
 
     def _note(self, message: Message) -> None:
-        """Keep what a message tells."""
+        """Update the link counters from a message."""
         if isinstance(message, SampleReport):
             self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
             self.ticks.add(message)

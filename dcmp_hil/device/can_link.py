@@ -51,7 +51,7 @@ def open_can(rig: Rig, clock: Clock) -> DeviceBackend:
 
 
 def listen(settings: CanSettings, clock: Clock) -> CanLink:
-    """Make a link that writes nothing by itself."""
+    """Return a link that only listens until a frame is sent."""
     return CanLink(settings, clock, listen_only=True)
 
 

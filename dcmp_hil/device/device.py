@@ -188,7 +188,7 @@ class DeviceBackend:
         self._meter.answered(self._clock.now_ns())
 
     def truth(self) -> Truth:
-        """Return NaN: a device does not know."""
+        """Return NaN for every value: a real device has no access to the true state."""
         return UNKNOWN_TRUTH
 
     def _give_up_after(self, gap_ns: int) -> NoReturn:

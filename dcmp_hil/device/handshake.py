@@ -50,7 +50,7 @@ _RELEASES, _NEXT_S = 3, 0.1
 
 
 class Greeting(NamedTuple):
-    """What the handshake found out."""
+    """Results of the handshake: session, firmware, history and zero of the device."""
 
     session: int
     tick: int  # of the newest SAMPLE, periods since the device's boot

@@ -29,7 +29,7 @@ class History(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """All of it, in words."""
+        """Return the history of the device as one sentence."""
         last = "none" if not self.fault else f"{name_of(self.fault)} (detail {_shown(self.detail)})"
         return (
             f"boot {_shown(self.boots)}, reset by {self._cause}, "

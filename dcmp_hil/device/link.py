@@ -19,7 +19,7 @@ class Link(Protocol):
 
     @property
     def corrupt(self) -> int:
-        """What arrived so far and was no frame."""
+        """Number of corrupt frames received so far."""
         ...
 
     @property
@@ -33,15 +33,15 @@ class Link(Protocol):
         ...
 
     def open(self) -> None:
-        """Open it, alone."""
+        """Open the link for exclusive use."""
         ...
 
     def close(self) -> None:
-        """Close it; closing what is not open does nothing."""
+        """Close the link; closing a closed link does nothing."""
         ...
 
     def send(self, frame: Frame) -> None:
-        """Send a frame, or drop it: never blocks."""
+        """Send a frame, or drop it if there is no room; never block."""
         ...
 
     def receive(self, timeout: float) -> Frame | None:

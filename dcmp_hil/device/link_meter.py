@@ -67,19 +67,19 @@ class LinkMeter:
         self.counts.late += now_ns - self._heard_ns > self._late_ns
 
     def take_health(self, health: Health | None) -> None:
-        """Keep a HEALTH, if there is one."""
+        """Store the newest HEALTH message; ignore None."""
         self.health = health or self.health
         if self._first_health is None:
             self._first_health = health
 
     @property
     def damaged(self) -> int:
-        """Frames that arrived damaged so far."""
+        """Number of damaged frames received so far."""
         return self.counts.corrupt + self._link.corrupt - self._damaged_before
 
     @property
     def counters(self) -> LinkCounters:
-        """Everything that was counted so far; a copy."""
+        """Return a copy of all link counters."""
         first, last = self._first_health, self.health
         device = None if first is None or last is None or first is last else growth(first[:5], last[:5])
         return replace(self.counts, corrupt=self.damaged, device=device, clock_error=self._clock.error)

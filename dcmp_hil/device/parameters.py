@@ -21,7 +21,7 @@ _COUNTS = 2**24  # of a SAMPLE
 
 
 class Parameters:
-    """Those of one device, for one session.
+    """Reads and sets the parameters of one device, for one session.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Parameters:
         return found.value
 
     def compared(self) -> dict[Parameter, int]:
-        """Return what a rig is held against."""
+        """Return the device's parameters that are compared with the rig."""
         return {parameter: self.get(parameter) for parameter in COMPARED}
 
     def put_limits(self, terms: Terms, built: Mapping[Parameter, int]) -> int:

@@ -42,12 +42,12 @@ def open_serial(rig: Rig, clock: Clock) -> DeviceBackend:
 
 
 def listen(settings: SerialSettings, _: Clock) -> SerialLink:
-    """Make a link that writes nothing by itself."""
+    """Return a link that only listens until a frame is sent."""
     return SerialLink(settings.port, settings.baud, listen_only=True)
 
 
 class SerialLink:
-    """A serial port, opened by this process alone.
+    """A serial port, opened for exclusive use.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class SerialLink:
 
     @property
     def corrupt(self) -> int:
-        """What arrived so far and was no frame."""
+        """Number of corrupt frames received so far."""
         return self._receiver.corrupt
 
     @property
@@ -178,12 +178,12 @@ class Port(serial.Serial):
     """A serial port that a process which is forked does not hold: it would keep the lock after our end."""
 
     def open(self) -> None:
-        """Open it."""
+        """Open the link for exclusive use."""
         super().open()
         keep_from_forks(self.fileno())
 
     def close(self) -> None:
-        """Close it; again is nothing."""
+        """Close the link; closing a closed link does nothing."""
         if self.is_open:
             forget(self.fileno())
         super().close()

@@ -75,7 +75,7 @@ class SlcanBus(can.BusABC):
 
     @property
     def corrupt(self) -> int:
-        """Lines so far that were no frame."""
+        """Number of received lines so far that were no frame."""
         return self._receiver.corrupt
 
     @property

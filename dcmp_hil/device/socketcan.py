@@ -37,12 +37,12 @@ def is_down(error: BaseException) -> bool:
 
 
 def was_down(settings: Can) -> OpenError:
-    """Say that it has not been brought up."""
+    """Return the error for an interface that has not been brought up."""
     return OpenError(f"socketcan {settings.channel}: the interface is down. Bring it up: {_up(settings)}.")
 
 
 def went_down(settings: Can) -> LinkError:
-    """Say that it was taken down."""
+    """Return the error for an interface that went down during a run."""
     return LinkError(
         f"socketcan {settings.channel}: the interface went down. The device goes to 0 V by itself. Bring it "
         f"up again: {_up(settings)}. If it was not taken down on purpose, look at the adapter."

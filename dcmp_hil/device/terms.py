@@ -19,7 +19,7 @@ _MOST = 2**31 - 1
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What a rig says of its device.
+    """The settings of a rig that concern its device.
 
     Parameters
     ----------

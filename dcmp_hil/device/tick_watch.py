@@ -34,10 +34,10 @@ class TickWatch:
 
     @property
     def suspicious(self) -> bool:
-        """Whether a longer look is worth it."""
+        """Whether the ticks so far are a reason to listen for longer."""
         return any(self._odd)
 
     @property
     def two_devices(self) -> bool:
-        """Whether two devices send under this node."""
+        """Whether the ticks show two devices with the same node number."""
         return len(self._odd) >= _FEWEST and sum(self._odd) >= _SHARE * len(self._odd)

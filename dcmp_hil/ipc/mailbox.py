@@ -35,7 +35,7 @@ STOP = 256
 
 
 class Answer(NamedTuple):
-    """What became of a change."""
+    """Result of a change and the device time at which it was applied."""
 
     what: int  # APPLIED, LOWERING or FAILED
     t: float  # s, device time
@@ -126,7 +126,7 @@ class Mailbox:
         return Answer(self.words[_ANSWER], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))
 
     def withdraw(self) -> None:
-        """Take back a change that was not taken."""
+        """Remove a change that the loop has not taken yet."""
         self.words[_LENGTH] = 0
 
     @property
@@ -150,7 +150,7 @@ class Mailbox:
         return change
 
     def reply(self, number: int, answer: Answer) -> None:
-        """Answer the change of that number."""
+        """Store the answer to the change with this number."""
         self.words[_ANSWER] = answer.what
         _TIME.pack_into(self.memory, _TIME_AT, answer.t)
         self.words[_TAKEN] = number

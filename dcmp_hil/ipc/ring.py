@@ -81,7 +81,7 @@ class Ring:
 
     @property
     def written(self) -> int:
-        """Rows written so far."""
+        """Number of rows written so far."""
         return self._count[0]
 
     @property
@@ -97,7 +97,7 @@ class Ring:
         return dict(zip(FIELDS, row[1:], strict=True)) if written and row[0] == written - 1 else {}
 
     def __len__(self) -> int:
-        """Rows waiting, those already lost included."""
+        """Return the number of rows not read yet, including those already overwritten."""
         return self.written - self.position
 
     def drain(self) -> NDArray[np.float64]:

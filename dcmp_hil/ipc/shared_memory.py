@@ -76,7 +76,7 @@ class Ledger:
 
 
 class Log:
-    """Bytes, one piece after the other.
+    """A log of bytes in shared memory, written piece by piece.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Log:
         self.length = length
 
     def append(self, data: bytes) -> None:
-        """Write behind what is there.
+        """Append bytes to the log.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Log:
         self.length += len(data)
 
     def read(self) -> bytearray:
-        """Return all of it."""
+        """Return the whole contents of the log."""
         data = bytearray(self.length)
         done = 0
         while done < self.length:

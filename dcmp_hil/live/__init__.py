@@ -40,7 +40,7 @@ class Control(Protocol):
         ...
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
-        """Begin to come up; must not wait.
+        """Start the control process, without waiting until it is ready.
 
         Parameters
         ----------

@@ -34,7 +34,7 @@ _OTHER_HANDLERS = (
 
 
 class Changes(Protocol):
-    """What the loop asks of live changes."""
+    """Protocol of the changes that are applied between two cycles."""
 
     def apply(self, t: float) -> None:
         """Apply what waits, between the period of device time `t` (s) and the next."""
@@ -45,11 +45,11 @@ class NoChanges:
     """Nothing ever changes."""
 
     def apply(self, t: float) -> None:
-        """Change nothing."""
+        """Do nothing: no changes are accepted."""
 
 
 class LiveChanges:
-    """Applies what a mailbox holds.
+    """Applies the changes that clients put into a mailbox.
 
     Gains are ramped, an observer keeps its estimates, a reference keeps position, velocity and acceleration:
     the voltage has no step.

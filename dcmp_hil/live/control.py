@@ -49,7 +49,7 @@ _NUMBERS = 1 << 10  # of signals, that are taken at once
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What the process needs to know.
+    """Arguments of the child process.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Server:
         self._crowd = Crowd()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Serve one connection."""
+        """Answer the requests of one client until it disconnects."""
         connection: socket.socket = writer.get_extra_info("socket")
         try:
             if peer_of(connection)[1] != os.getuid():

@@ -41,7 +41,7 @@ def folder() -> Path:
 
 
 def socket_of(pid: int) -> Path:
-    """Return where the run of that process listens."""
+    """Return the path of the socket of the run in process `pid`."""
     return folder() / f"{pid}.sock"
 
 

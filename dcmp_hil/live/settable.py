@@ -49,7 +49,7 @@ def value_of(rig: Rig, key: str) -> Any:
 
 
 def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
-    """Check a change and work it out.
+    """Check overrides of a running rig; return the new rig and the change to apply.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _different(before: Rig, after: Rig) -> dict[str, float | str]:
 
 
 def _in_words(before: Rig, values: Mapping[str, float | str]) -> str:
-    """Say what is different: "controller.kp_1_s2: 4000 -> 5200"."""
+    """Return the differences in words: "controller.kp_1_s2: 4000 -> 5200"."""
     known = settable(before)
     said = [
         f"{key}: {_shown(value_of(before, key))} -> {_shown(value)}"

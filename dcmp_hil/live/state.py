@@ -19,7 +19,7 @@ _PHASES = tuple(phase.value for phase in Phase)
 
 
 def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -> dict[str, Any]:
-    """Return what JSON can hold.
+    """Return the state of a run as a document for JSON.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ _LOOK = 0.002  # s
 
 
 class End(StrEnum):
-    """What became of STOP."""
+    """How a run ended after STOP."""
 
     CONFIRMED = "confirmed"  # at 0 V for sure
     UNCONFIRMED = "unconfirmed"  # the run ended, and the device did not say that it is at 0 V
@@ -40,7 +40,7 @@ class End(StrEnum):
 
 
 class Stopped(NamedTuple):
-    """What became of STOP, in a word that stays the same, and in a sentence."""
+    """How a run ended after STOP: as a fixed word, and as a sentence."""
 
     end: End
     said: str

@@ -43,7 +43,7 @@ class Bucket:
         self._at_ns = self._clock.now_ns()
 
     def take(self) -> bool:
-        """Take one; False if there is none left."""
+        """Take one token; return False if none is left."""
         now_ns = self._clock.now_ns()
         self._left = min(self._rate, self._left + 1e-9 * (now_ns - self._at_ns) * self._rate)
         self._at_ns = now_ns
@@ -135,7 +135,7 @@ class Visit(asyncio.Protocol):
         self._door.admit(self)
 
     def data_received(self, data: bytes) -> None:
-        """Collect; what follows a request is not read."""
+        """Collect the bytes of a request; bytes behind it are not read."""
         if self._answering is not None or self._refused or self._transport is None:
             return
         self._data += data
@@ -148,7 +148,7 @@ class Visit(asyncio.Protocol):
             self._serve(self._head)
 
     def eof_received(self) -> bool:
-        """Refuse what is not whole by now."""
+        """Refuse a request that is not complete at the end of the input."""
         if self._answering is None:
             self._refuse(HTTPStatus.BAD_REQUEST)
         return self._answering is not None
@@ -164,7 +164,7 @@ class Visit(asyncio.Protocol):
             self._answering.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget it."""
+        """Tell the door that the connection is closed."""
         self._door.forget(self)
         self._transport = None
         self._settled()

@@ -53,11 +53,11 @@ class Guard:
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
+        """Address of the page, with its token, for a browser."""
         return f"http://127.0.0.1:{self._port}/?token={self.token}"
 
     async def check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Answer a request, or refuse it."""
+        """Pass a request with the right host, origin and token to `handler`; refuse any other."""
         refusal = self._refusal(request)
         if refusal:
             raise web.HTTPForbidden(text=refusal, headers=self._headers)
@@ -66,7 +66,7 @@ class Guard:
         return await handler(request)
 
     async def add_headers(self, _: web.Request, response: web.StreamResponse) -> None:
-        """Say what the page may load."""
+        """Add the headers that restrict what the page may load."""
         response.headers.update(self._headers)
 
     def _let_in(self) -> web.Response:

@@ -22,7 +22,7 @@ _OF_CONNECTION = {b"connection", b"keep-alive", b"proxy-connection", b"te", b"tr
 
 
 class RequestError(Exception):
-    """A request that is not read any further.
+    """A malformed or refused request, and the status of its answer.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class RequestError(Exception):
 
 
 class Head(NamedTuple):
-    """What a request says before its body."""
+    """Request line, headers and lengths of a request."""
 
     size: int  # bytes that it took
     method: bytes

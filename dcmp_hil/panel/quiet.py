@@ -36,7 +36,7 @@ class _OnceEach(logging.Filter):
 
 @contextmanager
 def quiet(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
-    """Bound what is logged while `loop` serves."""
+    """Limit the log messages of the web server while `loop` serves."""
     once = _OnceEach()
     log = logging.getLogger("asyncio")
 

@@ -60,7 +60,7 @@ class Panel:
         self._ending = asyncio.Event()
 
     def application(self) -> web.Application:
-        """Make what answers requests."""
+        """Return the web application that answers the requests."""
 
         @web.middleware
         async def check(request: web.Request, handler: Any) -> web.StreamResponse:

@@ -16,7 +16,7 @@ _LINE = 1 << 16  # bytes
 
 
 class Watcher:
-    """The newest that is known of a run.
+    """Follows the newest run and keeps its latest state.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Watcher:
         self.state: dict[str, Any] = {"connection": "none"}
 
     async def watch(self) -> None:
-        """Watch one run after the other, for ever."""
+        """Follow one run after the other, until cancelled."""
         while True:
             pid = await asyncio.to_thread(self._find)
             if pid is not None:

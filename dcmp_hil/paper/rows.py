@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What is known beforehand of one quantity.
+    """Expected value and tolerance of one quantity of the paper.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """What is known beforehand of one misprint.
+    """A misprint of the paper, its correction, and the run that shows its effect.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether this process could show a window."""
+"""Check whether this process has a display for a window."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def host_facts() -> dict[str, Any]:
 
 
 def in_words(facts: dict[str, Any]) -> str:
-    """Return the facts as one line."""
+    """Return the facts about this computer as one line."""
     return ", ".join(f"{name} {'unknown' if fact is None else fact}" for name, fact in facts.items())
 
 

@@ -44,7 +44,7 @@ _CPU = "Name one that this process may use in timing.cpu: `taskset -cp $$` lists
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """One thing asked of the operating system.
+    """One request to the operating system and its result.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ class Grant:
 
     @property
     def granted(self) -> bool:
-        """Whether it was."""
+        """Whether the operating system granted the request."""
         return not self.refusal
 
 
 class _Wish(NamedTuple):
-    """One thing to ask for."""
+    """One request to the operating system, before it is made."""
 
     what: str
     take: Callable[[TimingSection, ExitStack], None]  # OSError if refused; pushes how to undo it
@@ -95,7 +95,7 @@ class RealTime:
         self.grants: list[Grant] = []
 
     def __enter__(self) -> Self:
-        """Take it.
+        """Request every setting of `[timing]` from the operating system.
 
         Raises
         ------

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def find_named(
     path: str, key: str, known: Iterable[str] = (), folders: Sequence[Path] = ()
 ) -> Callable[..., Any]:
-    """Import what `path` means.
+    """Import the class or function that `module:Name` names.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_named(
 def make_named(
     path: str, role: Role, folders: Sequence[Path], arguments: Sequence[object], options: Mapping[str, Any]
 ) -> Any:
-    """Import a class and make one.
+    """Import a class and return an instance of it.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _lacks(made: object, role: Role) -> str:
 
 
 def needs(role: Role) -> str:
-    """Say what a class of a role needs."""
+    """Return a sentence on the methods that a class of this role must have."""
     return f"It needs {', '.join(role.methods)}: see docs/plugins.md."
 
 

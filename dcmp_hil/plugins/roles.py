@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class Role(NamedTuple):
-    """What a class is named for.
+    """A role that a class of the user's own may have.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ def message_of(error: BaseException) -> str:
 
 
 def syntax_of(error: SyntaxError) -> str:
-    """Return file, line and what is wrong there."""
+    """Return file, line and message of a syntax error."""
     line = f", line {error.lineno}" if error.lineno else ""
     text = f": {error.text.strip()[:_LONGEST_VALUE]}" if error.text and error.text.strip() else ""
     return f"{shown_path(error.filename or 'source')}{line}: {error.msg}{text}"

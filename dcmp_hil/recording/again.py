@@ -135,7 +135,7 @@ class _Past:
         self._began = math.inf
 
     def follow(self, row: list[float], estimate: Estimate) -> None:
-        """Do what the loop did in this period."""
+        """Repeat the trajectory's transitions of the recorded cycle."""
         t, began = row[0], row[_AT["began"]]
         if self._holds:  # the first period of the run, and of the way down
             self._holds = False

@@ -113,7 +113,7 @@ class Backlog:
         self._file.close()
 
     def _append(self, data: bytes) -> None:
-        """Write all of `data`, or nothing that stays."""
+        """Append all of `data`; cut the file back if that fails."""
         rest = memoryview(data)
         try:
             while rest:

@@ -32,7 +32,7 @@ class ChunkIndices:
         self._packed = bytearray()
 
     def append(self, index: ChunkIndex) -> None:
-        """Keep the index of one more chunk."""
+        """Append the index of a chunk."""
         start = index.chunk_start_offset
         self._compression = index.compression
         self._packed += _PACKED.pack(

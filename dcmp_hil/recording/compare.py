@@ -24,7 +24,7 @@ class Line(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What `--json` writes.
+    """Result of a comparison, as `--json` writes it.
 
     Parameters
     ----------

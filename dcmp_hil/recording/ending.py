@@ -19,7 +19,7 @@ _LONGEST = 1 << 16  # bytes of the attachment at the end
 
 
 class Ending(NamedTuple):
-    """What was written when the run ended.
+    """Facts that are written at the end of a recording.
 
     Parameters
     ----------

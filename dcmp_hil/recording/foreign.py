@@ -92,7 +92,7 @@ class UnreadTable:
         self._path, self._table = path, table
 
     def at(self, t: float) -> Reference:  # noqa: ARG002 - as every reference
-        """Refuse.
+        """Raise: the file of the reference is not read.
 
         Raises
         ------

@@ -70,7 +70,7 @@ def to_bytes(rows: NDArray[np.float64]) -> list[bytes]:
 
 
 def event_to_bytes(event: Event, at_ns: int) -> bytes:
-    """Return an event as JSON.
+    """Return an event and its time as a document in JSON.
 
     Parameters
     ----------

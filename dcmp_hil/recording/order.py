@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Gap(NamedTuple):
-    """Periods that are missing.
+    """A stretch of missing periods.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Gap(NamedTuple):
     periods: int | None
 
     def __str__(self) -> str:
-        """Return it as a sentence."""
+        """Return the gap as a sentence."""
         many = (
             "what came later is missing"
             if self.periods is None
@@ -46,7 +46,7 @@ class Gap(NamedTuple):
 
 
 class Ordered(NamedTuple):
-    """What is there, in order.
+    """The rows of a recording in order, without duplicates.
 
     Parameters
     ----------

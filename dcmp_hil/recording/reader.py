@@ -79,7 +79,7 @@ class RecordedRun:
 
     @property
     def block(self) -> Block:
-        """All periods as one block."""
+        """Return all periods as one block."""
         return Block(self.rows, self.rig.model.values())
 
     @property
@@ -188,7 +188,7 @@ def _rig(path: Path, found: _Found, run: dict[str, str]) -> Rig:
 
 
 class _Found:
-    """What was found in the file."""
+    """Contents of a recording's file, before they are put in order."""
 
     def __init__(self) -> None:
         self.messages = Messages()

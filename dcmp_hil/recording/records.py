@@ -33,7 +33,7 @@ _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 
 
 class Op(IntEnum):
-    """Opcodes that are looked into."""
+    """MCAP opcodes that the reader evaluates."""
 
     HEADER = 0x01
     FOOTER = 0x02

@@ -109,7 +109,7 @@ class Scanner:
         self.closed = False
 
     def __iter__(self) -> Iterator[Record | Damage]:
-        """Yield records and what lies between them."""
+        """Yield the records of the file, and the damage between them."""
         at = len(MAGIC)
         if self._bytes(0, at) != MAGIC:
             at = self._resume(0)

@@ -194,7 +194,7 @@ class Recording:
             self._cut_at, self._cut_t = self._period, self._t
 
     def _put(self) -> None:
-        """Write what waits; tell what changed."""
+        """Write the rows that wait; warn if the state of the disk changed."""
         waited = self._file.refused
         written = self._file.put()
         if not written and not waited:
@@ -222,7 +222,7 @@ def _span(piece: Piece) -> tuple[float, float, int]:
 
 
 def _joined(spans: list[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
-    """Join stretches that follow one another."""
+    """Merge consecutive stretches."""
     joined: list[tuple[float, float, int]] = []
     for start, stop, periods in spans:
         if joined and joined[-1][1] == start:

@@ -21,7 +21,7 @@ NONE = "none"
 
 
 class Columns(NamedTuple):
-    """The columns that a recording is made from.
+    """The columns of a CSV file that are used, by quantity.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Columns(NamedTuple):
 
     @property
     def all(self) -> tuple[Match, ...]:
-        """Return those that there are."""
+        """Return the matches of all columns that were found."""
         columns = (self.time, self.fraction, self.position, self.input, self.velocity)
         return tuple(column for column in columns if column is not None)
 

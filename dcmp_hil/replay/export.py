@@ -22,7 +22,7 @@ _APPLICATION = "dcmp-hil replay"
 
 
 def columns(result: ReplayResult) -> dict[str, NDArray[np.float64]]:
-    """Lay a replay out as columns.
+    """Return the results of a replay as named columns.
 
     Returns
     -------

@@ -17,7 +17,7 @@ _NOTHING = 1e-12  # rad/s2: what rounding leaves of a constant
 
 
 class Estimates(NamedTuple):
-    """What the observer believed, row by row.
+    """Estimates of the observer, one for each row.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def split(text: str, delimiter: str) -> list[str]:
 
 
 def find_layout(path: Path, lines: Sequence[str], forced: str) -> Layout:
-    """Find the layout that explains most lines.
+    """Return the layout under which most lines are valid rows.
 
     Parameters
     ----------

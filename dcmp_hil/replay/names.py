@@ -115,7 +115,7 @@ class Match(NamedTuple):
     source: str
 
     def __str__(self) -> str:
-        """Say it in a line."""
+        """Return the match as one line of text."""
         why = _WHY[self.source]
         return f'{self.quantity}: column "{self.column}" in {self.unit} ({why})'
 

@@ -30,7 +30,7 @@ _PAPER_M = 1000.0  # rad/s3
 
 
 class Preparation(NamedTuple):
-    """Everything that is settled before the first row.
+    """Observer, model and settings of a replay, fixed before the first row.
 
     Parameters
     ----------

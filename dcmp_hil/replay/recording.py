@@ -93,7 +93,7 @@ class Recording:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check what every later step relies on.
+        """Check lengths, order and finiteness of the columns.
 
         Raises
         ------

@@ -27,7 +27,7 @@ _EPOCHS = ((1e11, 1e14, "ms", 1e-3), (1e14, 1e17, "us", 1e-6), (1e17, 1e20, "ns"
 
 
 class Stamps(NamedTuple):
-    """What became of a time column.
+    """Times of the rows, and notes on how they were corrected.
 
     Parameters
     ----------

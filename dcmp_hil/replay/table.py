@@ -122,7 +122,7 @@ def read_table(path: Path) -> Table:
 
 
 def _said(before: Sequence[Line], left_out: Sequence[Line], repeated: int) -> Iterator[str]:
-    """Say what is left out."""
+    """Yield a sentence for each kind of row that is left out."""
     if before:
         yield f"{_lines(len(before))} before the header left out ({_shown(before[0])})."
     if repeated:

@@ -91,7 +91,7 @@ class Chatter:
         return Stop("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
 
     def _explanation(self, said: str) -> Explanation:
-        """Find what the voltage follows."""
+        """Return the likely cause of the chatter, with its remedy."""
         sentence, remedy = cause_of(self.samples, self._count)
         return Explanation("chatter", f"{sentence}: {said}", remedy)
 

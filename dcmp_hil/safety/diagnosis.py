@@ -85,7 +85,7 @@ class Diagnosis:
         return self._seen
 
     def finding(self) -> Finding:
-        """Say what the last samples look like."""
+        """Return the likely cause, judged by the last samples."""
         if len(self._seen) < _FEWEST:
             return _OTHER
         t, position, voltage, _ = np.array(self._seen, float).T

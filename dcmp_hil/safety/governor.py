@@ -23,7 +23,7 @@ _LONGEST, _STEP = 0.1, 2e-3  # s
 
 
 class Bounds(NamedTuple):
-    """What a reference may ask for, either way."""
+    """Largest position, velocity and acceleration of a reference, both signs."""
 
     position: float  # rad
     velocity: float  # rad/s

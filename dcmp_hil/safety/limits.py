@@ -30,7 +30,7 @@ class _Lasting:
         self._since, self._last = math.inf, -math.inf
 
     def too_long(self, t: float) -> bool:
-        """Take a period in which it does."""
+        """Note that the condition holds at `t` (s); return whether it has held for too long."""
         if not t - self._last <= self._gap:
             self._since = t
         self._last = t

@@ -36,7 +36,7 @@ _TELLING = 2.0  # counts that a push must be expected to move the arm by
 
 
 class MotorGain(NamedTuple):
-    """What the probe found of the motor."""
+    """Motor gain that the polarity check measured."""
 
     gain: float  # (rad/s2)/V, ku/J
     deviation: float  # (rad/s2)/V, standard deviation
@@ -48,7 +48,7 @@ class MotorGain(NamedTuple):
         return self.gain / self.believed
 
     def document(self) -> dict[str, float]:
-        """Return what `run --json` holds of it."""
+        """Return the measured gain as a document for `run --json`."""
         return {
             "gain_rad_s2_V": self.gain,
             "deviation_rad_s2_V": self.deviation,

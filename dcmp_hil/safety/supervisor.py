@@ -31,7 +31,7 @@ class Phase(StrEnum):
 
 
 class Cue(Enum):
-    """What moves a run on."""
+    """Conditions that lead from one phase of a run to the next."""
 
     ARMED = auto()  # the first sample, and a probe is wanted
     ARMED_UNPROBED = auto()  # the first sample, and none is

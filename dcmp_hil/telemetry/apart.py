@@ -217,7 +217,7 @@ class Apart:
         return process, ours
 
     def _finish(self, process: subprocess.Popen[bytes], channel: socket.socket) -> str:
-        """Let the process finish; return what went wrong."""
+        """Wait until the process ends; return the error message, empty if there is none."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(_LEAVING * 1e9)
         with suppress(OSError):

@@ -22,7 +22,7 @@ _WAITING = 10_000  # events
 
 @runtime_checkable
 class Sink(Protocol):
-    """Something that wants to see the run."""
+    """Protocol of a receiver of blocks and events."""
 
     def block(self, block: Block) -> None:
         """Take consecutive periods."""
@@ -67,7 +67,7 @@ class Audience:
         self._warned = {id(sink): len(_warnings(sink)) for sink in self._sinks}
 
     def event(self, event: Event) -> None:
-        """Put an event behind those that wait."""
+        """Append an event to the queue."""
         self._events.append(event)
 
     def dispatch(self) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def begin(
     target: rr.FileSink | rr.GrpcSink | rr.GrpcServerSink, rig: RigView, stream: rr.RecordingStream
 ) -> None:
-    """Send what is known before the first period."""
+    """Send rig, description and layout, which are known before the first period."""
     layout = dashboard(rig)
     stream.set_sinks(target, default_blueprint=layout)
     stream.send_recording_name(rig.name)

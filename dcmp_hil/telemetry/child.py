@@ -44,7 +44,7 @@ _ORPHANED = 1.0  # s for those that are late where the parent is gone: no user l
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What the process needs to know.
+    """Arguments of the child process.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class Feed:
         return on and self.outlet.do(partial(send, self._frames.of_event(event)))
 
     def send_rest(self) -> bool:
-        """Send what waits; see `block`."""
+        """Send the blocks that wait; see `block`."""
         if not self._waiting:
             return True
         block = _joined(self._waiting)
@@ -92,7 +92,7 @@ class Feed:
 
 
 def send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
-    """Send columns."""
+    """Send the columns of a block to a stream of Rerun."""
     for entity, times, columns in calls:
         stream.send_columns(entity, times, columns)
 

@@ -113,7 +113,7 @@ class SharedKeeper:
 
     @property
     def events(self) -> list[Event]:
-        """What happened, in order."""
+        """Events of the run, in order."""
         data, place, found = self._events.read(), 0, []
         while place < len(data):
             begin = place + 4

@@ -39,7 +39,7 @@ class Deferred:
         return warnings
 
     def make(self) -> None:
-        """Make the sink; until then it takes nothing.
+        """Make the sink; blocks and events before this call are ignored.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class Deferred:
             self._sink.event(event)
 
     def close(self) -> None:
-        """Finish."""
+        """Close the sink, if it was made."""
         if self._sink:
             self._sink.close()
 

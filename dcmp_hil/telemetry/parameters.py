@@ -53,7 +53,7 @@ class Parameters:
         return [self._numbers.get(key, math.nan) / start for key, start in self._start.items()]
 
     def numbers(self) -> Iterator[tuple[str, float]]:
-        """Yield what is tuned and a number."""
+        """Yield the name and value of each tunable number."""
         for key, value in self._numbers.items():
             if key.startswith(_TUNED) and math.isfinite(value):
                 yield key, value

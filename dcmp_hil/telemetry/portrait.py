@@ -47,7 +47,7 @@ class Portrait:
         self._slot = self._picture = -1
 
     def add(self, block: Block) -> None:
-        """Take consecutive periods, at least one."""
+        """Add a block of at least one consecutive period."""
         reference = block.reference
         columns = [
             *(block["t"], block["position_estimate"], block["velocity_estimate"]),

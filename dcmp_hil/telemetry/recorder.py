@@ -77,7 +77,7 @@ class Recorder:
         self._closed = False
 
     def record(self, cycle: Cycle) -> None:
-        """Take one period."""
+        """Write the values of one cycle into the ring; never block."""
         sample, _, reference, _, _, _ = cycle
         t = sample.t
         now, began = self._now(t, reference)
@@ -103,7 +103,7 @@ class Recorder:
 
     @property
     def written(self) -> int:
-        """Periods taken so far."""
+        """Number of periods recorded so far."""
         return self._ring.written
 
     @property

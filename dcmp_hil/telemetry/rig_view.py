@@ -1,4 +1,4 @@
-"""What a viewer is told about a rig."""
+"""The parts of a rig that a viewer shows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RigView:
-    """What a viewer is told about a rig.
+    """The parts of a rig that a viewer shows.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ _FIRST = ("controller", "observer", "reference", "loop")  # what is tuned is vis
 
 
 def view_of(rig: Rig) -> RigView:
-    """Reduce a rig to what a viewer shows."""
+    """Return the parts of a rig that a viewer shows."""
     limit = rig.amplifier.limit
     rows = [(key, value.strip('"')) for key, value, _ in explain(rig) if key != "name"]
     return RigView(

@@ -139,7 +139,7 @@ class Durations:
 
 
 class Statistics:
-    """A sink that makes the Summary.
+    """A sink that computes the Summary of a run.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class Statistics:
         """Nothing to finish."""
 
     def summary(self, realtime_factor: float) -> Summary:
-        """Return the figures so far."""
+        """Return the summary of the blocks so far."""
         span = self._last_t - self._first_t
         return Summary(
             tracking_rms_rad=self._tracking.rms,

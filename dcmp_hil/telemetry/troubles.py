@@ -36,7 +36,7 @@ NO_WINDOW = (
 
 
 def stuck(outlet: Outlet) -> str:
-    """Say that an outlet takes nothing any more."""
+    """Return the warning for an outlet that no longer takes data."""
     if outlet.file is None:
         return _STUCK
     return f"{incomplete(outlet, f'it did not grow for {outlet.stalled:.0f} s')} The run goes on."

@@ -37,7 +37,7 @@ def encode(frame: Frame) -> bytes:
 
 
 class Receiver:
-    """Finds frames in bytes that come in pieces.
+    """Decodes frames from a stream of bytes in pieces of any length.
 
     What is no frame is dropped up to the next 0x00 and counted in `corrupt`.
     """

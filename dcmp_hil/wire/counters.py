@@ -1,4 +1,4 @@
-"""Counters that wrap, and what they mean."""
+"""Counters that wrap: differences and continuation."""
 
 
 def nearest(value: int, raw: int, bits: int) -> int:

@@ -1,4 +1,4 @@
-"""What every carrier carries."""
+"""Type of a CAN frame, common to all links."""
 
 from typing import TypeAlias
 

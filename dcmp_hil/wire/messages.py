@@ -45,7 +45,7 @@ class Parameter(IntEnum):
 
 
 class Result(IntEnum):
-    """What became of a PARAMETER_SET or _GET."""
+    """Result codes of PARAMETER_SET and PARAMETER_GET."""
 
     OK = 0
     UNKNOWN = 1
@@ -62,7 +62,7 @@ class Stop(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """DRIVE: what to apply, every period."""
+    """DRIVE: voltage to apply and the owner's requests, every period."""
 
     voltage_mV: int  # -32768..32767
     seq: int  # tick modulo 8192 of the SAMPLE that it was computed from
@@ -120,7 +120,7 @@ class Identity(NamedTuple):
 
 
 class ParameterGet(NamedTuple):
-    """PARAMETER_GET."""
+    """PARAMETER_GET: a request for the value of a parameter."""
 
     id: int  # a Parameter
 
@@ -134,7 +134,7 @@ class ParameterSet(NamedTuple):
 
 
 class ParameterValue(NamedTuple):
-    """PARAMETER_VALUE: what holds now."""
+    """PARAMETER_VALUE: the present value of a parameter, and a result code."""
 
     id: int  # a Parameter
     value: int

@@ -21,7 +21,7 @@ def encode(frame: Frame) -> bytes:
 
 
 class Receiver:
-    """Finds frames in bytes that come in pieces.
+    """Decodes frames from a stream of bytes in pieces of any length.
 
     Answers of an adapter to commands are no frames and no damage; everything else is dropped up to the next
     CR and counted in `corrupt`.

@@ -86,7 +86,7 @@ class BoardLink:
 
     @property
     def corrupt(self) -> int:
-        """What arrived so far and was no frame."""
+        """Number of corrupt frames received so far."""
         return self._receiver.corrupt if self._receiver else 0
 
     other_carrier = ""  # the board has the carrier that the rig says

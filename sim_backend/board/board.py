@@ -115,7 +115,7 @@ class Board:
 
     @property
     def applied_mV(self) -> int:
-        """What the amplifier is told now, mV."""
+        """Voltage command of the amplifier at present, mV."""
         return self._view[hostlib.VOLTAGE]
 
     @property

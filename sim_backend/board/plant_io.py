@@ -56,7 +56,7 @@ class PlantIO:
         self._plant.stretch(factor)
 
     def count(self) -> int:
-        """Return what the encoder's counter shows, 32 bits."""
+        """Return the encoder's counter, 32 bits."""
         return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _WORD
 
 

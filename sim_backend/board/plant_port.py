@@ -14,7 +14,7 @@ _UNASKED, _LINK_UP = 1, 2  # flags of OUTPUT
 
 
 class Output(NamedTuple):
-    """What the firmware told the plant."""
+    """Output of the firmware to the plant."""
 
     now_us: int  # by the firmware's clock
     since_us: int  # when the output became what it is
@@ -28,7 +28,7 @@ class Output(NamedTuple):
 
     @property
     def unasked(self) -> bool:
-        """Whether it changed between two ticks."""
+        """Whether the output changed between two ticks."""
         return self.flags & _UNASKED != 0
 
     @property

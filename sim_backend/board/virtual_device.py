@@ -152,7 +152,7 @@ class VirtualDevice:
         self._thread.start()
 
     def run_ticks(self, count: int) -> None:
-        """Let so many periods pass.
+        """Run `count` ticks of the board.
 
         Raises
         ------

@@ -17,7 +17,7 @@ Value = float | str
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A parameter that is a number.
+    """A numerical parameter of a fault, with its bounds.
 
     Parameters
     ----------
@@ -82,11 +82,11 @@ class FaultModel:
         self._params = params
 
     def number(self, name: str) -> float:
-        """Return a parameter that is a number."""
+        """Return the value of a numerical parameter."""
         return float(self._params[name])
 
     def word(self, name: str) -> str:
-        """Return a parameter that is a word."""
+        """Return the value of a parameter with a choice of words."""
         return str(self._params[name])
 
     def periods(self, name: str) -> int:

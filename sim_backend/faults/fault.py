@@ -25,7 +25,7 @@ When = int | float | str | Callable[[FaultContext], bool]
 
 
 class Fault:
-    """One thing that goes wrong.
+    """One fault of a plan: kind, time and parameters.
 
     Parameters
     ----------
@@ -68,5 +68,5 @@ class Fault:
         return cls(kind, at, length, **said)
 
     def make(self, facts: RigFacts, rng: random.Random) -> FaultModel:
-        """Make its effect for one run."""
+        """Return the model of the fault for one run."""
         return KINDS[self.kind].make(facts, rng, **self.params)

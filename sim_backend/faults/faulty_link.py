@@ -27,11 +27,11 @@ class LineFaults(Protocol):
         ...
 
     def passed(self, piece: bytes, way: Way) -> list[bytes]:
-        """Return what arrives at once of a piece."""
+        """Return the pieces that arrive at once after `piece` was sent."""
         ...
 
     def released(self, way: Way) -> list[bytes]:
-        """Return what arrives now of earlier pieces."""
+        """Return the delayed pieces that are due now."""
         ...
 
 

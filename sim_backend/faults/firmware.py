@@ -72,7 +72,7 @@ class RogueHost(FaultModel):
             board.receive_frame(*pack(self.message(board), self.facts.node))
 
     def message(self, board: Board) -> Message:  # noqa: ARG002
-        """Return what is said."""
+        """Return the message that is injected."""
         return Stop(round(self.number("reason")))
 
     def other(self, board: Board) -> int:
@@ -85,7 +85,7 @@ class RogueHello(RogueHost):
     """Another host wants the device."""
 
     def message(self, board: Board) -> Message:
-        """Ask for it."""
+        """Return the message that requests the fault."""
         return Hello(self.other(board), PROTOCOL_HASH)
 
 
@@ -99,10 +99,10 @@ class RogueDrive(RogueHost):
 
 
 class OtherVersion(WireFault):
-    """The device says that it speaks another protocol."""
+    """The device reports another protocol hash."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Change what IDENTITY says."""
+        """Return IDENTITY with its hash changed."""
         frames = self._frames(piece)
         message = self._understood(frames[0]) if way == "down" and len(frames) == 1 else None
         if not isinstance(message, Identity):

@@ -30,23 +30,23 @@ class HostFault(FaultModel):
     """Lets time pass, s, without the host noticing; the injector sets it."""
 
     def sample(self, sample: Sample) -> Sample:
-        """Return what the loop reads."""
+        """Return the sample that the loop gets."""
         return sample
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Return what the observer says."""
+        """Return the estimate that the loop gets from its observer."""
         return estimate
 
     def demand(self, demand: float) -> float:
-        """Return what the controller asks for."""
+        """Return the controller's voltage demand that the loop gets, V."""
         return demand
 
 
 class Spoil(HostFault):
-    """A number of the period is none."""
+    """One value of the cycle becomes NaN or infinite."""
 
     def sample(self, sample: Sample) -> Sample:
-        """Return the sample with one number spoilt."""
+        """Return the sample with one value replaced by NaN or infinity."""
         return sample._replace(**self._spoilt("sample"))
 
     def estimate(self, estimate: Estimate) -> Estimate:
@@ -70,13 +70,13 @@ class Raise(HostFault):
     """Observer or controller raises."""
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Raise instead."""
+        """Raise the injected exception in place of an estimate."""
         if self.word("where") == "observer":
             self._raise()
         return estimate
 
     def demand(self, demand: float) -> float:
-        """Raise instead."""
+        """Raise the injected exception in place of a demand."""
         if self.word("where") == "controller":
             self._raise()
         return demand
@@ -105,7 +105,7 @@ class Switch(HostFault):
     _periods = 0
 
     def demand(self, demand: float) -> float:  # noqa: ARG002 - it asks for something else
-        """Return one of the two, by turns."""
+        """Return the two voltages in turn, V."""
         self._periods += 1
         up = self._periods // round(self.number("every")) % 2
         return self.number("V") if up else -self.number("V")
@@ -127,7 +127,7 @@ class Slow(HostFault):
 
 
 class Late(Slow):
-    """The host wakes up late, before it reads."""
+    """The host wakes up late, before it reads the sample."""
 
     def sample(self, sample: Sample) -> Sample:
         """Sleep on; the sample is an old one when it is used."""

@@ -52,7 +52,7 @@ class Timer:
         self._length = _ticks(fault.for_, period)
 
     def look(self, moment: FaultContext) -> None:
-        """Switch it on or off."""
+        """Activate or deactivate the fault according to the time."""
         if self.began is None:
             if self._when(moment) if self._when else moment.tick >= self._first:
                 self.began = moment.tick
@@ -204,7 +204,7 @@ class Injector:
         return self._first_began
 
     def passed(self, piece: bytes, way: Way) -> list[bytes]:
-        """Return what arrives at once of a piece."""
+        """Return the pieces that arrive at once after `piece` was sent."""
         pieces = [piece]
         for effect in self._wire:
             if effect.affects(way):
@@ -212,30 +212,30 @@ class Injector:
         return pieces
 
     def released(self, way: Way) -> list[bytes]:
-        """Return what arrives now of earlier pieces."""
+        """Return the delayed pieces that are due now."""
         return [piece for effect in self._wire for piece in effect.released(way)]
 
     @property
     def acting_on_plant(self) -> list[PlantFault]:
-        """Those that are on."""
+        """Return the plant faults that are active."""
         return [effect for effect in self._plant if effect.on]
 
     def sample(self, sample: Sample) -> Sample:
-        """Return what the loop reads."""
+        """Return the sample that the loop gets."""
         for effect in self._host:
             if effect.on:
                 sample = effect.sample(sample)
         return sample
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Return what the observer says."""
+        """Return the estimate that the loop gets from its observer."""
         for effect in self._host:
             if effect.on:
                 estimate = effect.estimate(estimate)
         return estimate
 
     def demand(self, demand: float) -> float:
-        """Return what the controller asks for, V."""
+        """Return the controller's voltage demand that the loop gets, V."""
         for effect in self._host:
             if effect.on:
                 demand = effect.demand(demand)

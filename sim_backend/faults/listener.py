@@ -15,13 +15,13 @@ class FaultListener:
         """Learn which board it is; None on the plain simulated rig."""
 
     def heard(self, piece: bytes) -> None:
-        """Learn what reaches the board."""
+        """Note a piece that reaches the board."""
 
     def said(self, piece: bytes) -> None:
         """Learn what the board sends, before the wire has it."""
 
     def fetched(self) -> None:
-        """Learn that the board's tick is over."""
+        """Note the end of the board's tick."""
 
     def wrote(self, voltage: float) -> None:
         """Learn what the host's loop gives to its backend, V."""

@@ -27,11 +27,11 @@ class PlantFault(FaultModel):
 
 
 class Acting(Protocol):
-    """The faults that are on."""
+    """Protocol of a source of active plant faults."""
 
     @property
     def acting_on_plant(self) -> list[PlantFault]:
-        """Those that are on."""
+        """Return the plant faults that are active."""
         ...
 
     def tick(self) -> None:
@@ -68,7 +68,7 @@ class FaultyPlant:
         return self.truth
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long."""
+        """Make one period of the plant `factor` times as long."""
         self._plant.stretch(factor)
 
 
@@ -157,7 +157,7 @@ class Missed(PlantFault):
     _lost = 0
 
     def count(self, counts: float) -> float:
-        """Return the count without those that were lost."""
+        """Return the count minus the lost counts."""
         moved = 0 if self._last is None else round(counts - self._last)
         self._last = counts
         lost = sum(self.rng.random() < self.number("p") for _ in range(min(abs(moved), 1000)))
@@ -181,7 +181,7 @@ class Scale(PlantFault):
     """The encoder has `factor` times the counts a revolution that the rig says."""
 
     def count(self, counts: float) -> float:
-        """Return the count of the other encoder."""
+        """Return the count of an encoder with `factor` times the resolution."""
         return math.floor(counts * self.number("factor") + 0.5)
 
 
@@ -205,7 +205,7 @@ class MotorSign(PlantFault):
     """The motor's wires are swapped."""
 
     def voltage(self, volts: float) -> float:
-        """Return the voltage with the other sign, V."""
+        """Return the negated voltage, V."""
         return -volts
 
 
@@ -245,7 +245,7 @@ class Shove(PlantFault):
         self._volts = sign * self.number("rad_s2") / self.facts.ku
 
     def voltage(self, volts: float) -> float:
-        """Add what gives this acceleration."""
+        """Return the voltage plus the equivalent of the push, V."""
         return volts + self._volts
 
 

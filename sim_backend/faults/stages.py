@@ -21,15 +21,15 @@ class HostFaults(Protocol):
         ...
 
     def sample(self, sample: Sample) -> Sample:
-        """Return what the loop reads."""
+        """Return the sample that the loop gets."""
         ...
 
     def estimate(self, estimate: Estimate) -> Estimate:
-        """Return what the observer says."""
+        """Return the estimate that the loop gets from its observer."""
         ...
 
     def demand(self, demand: float) -> float:
-        """Return what the controller asks for, V."""
+        """Return the controller's voltage demand that the loop gets, V."""
         ...
 
 
@@ -94,7 +94,7 @@ class FaultyObserver:
         self._update, self._faults = observer.update, faults
 
     def update(self, sample: Sample) -> Estimate:
-        """Estimate; then it goes wrong."""
+        """Return the observer's estimate, changed by the active faults."""
         return self._faults.estimate(self._update(sample))
 
 
@@ -113,5 +113,5 @@ class FaultyController:
         self._update, self._faults = controller.update, faults
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
-        """Control; then it goes wrong."""
+        """Return the controller's demand, changed by the active faults, V."""
         return self._faults.demand(self._update(reference, estimate))

@@ -32,11 +32,11 @@ class WireFault(FaultModel):
         self._way = str(params.get("way", "both"))
 
     def affects(self, way: Way) -> bool:
-        """Whether it changes what travels that way now."""
+        """Whether the fault is active for this direction."""
         return self.on and self._way in ("both", way)
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
-        """Return what arrives at once of a piece."""
+        """Return the pieces that arrive at once after `piece` was sent."""
         return (piece,)
 
     def released(self, way: Way) -> list[bytes]:  # noqa: ARG002
@@ -48,7 +48,7 @@ class RandomFault(WireFault):
     """Changes each piece with probability `p`."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
-        """Return most pieces as they are."""
+        """Return the pieces that arrive, changed at random."""
         return self.spoil(piece) if self.rng.random() < self.number("p") else (piece,)
 
     def spoil(self, piece: bytes) -> Iterable[bytes]:  # noqa: ARG002
@@ -57,12 +57,12 @@ class RandomFault(WireFault):
 
 
 class Drop(RandomFault):
-    """Loses pieces, so many in a row."""
+    """Drops pieces, a number of them in a row."""
 
     _left: dict[Way, int]
 
     def begin(self) -> None:
-        """Start with none to lose."""
+        """Reset the number of pieces still to drop."""
         self._left = {"up": 0, "down": 0}
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
@@ -149,11 +149,11 @@ class Timed(WireFault):
         self._waiting: dict[Way, list[tuple[int, bytes]]] = {"up": [], "down": []}
 
     def keep(self, piece: bytes, way: Way, periods: int) -> None:
-        """Let a piece arrive so much later."""
+        """Delay a piece by a number of periods."""
         self._waiting[way].append((self._now + periods, piece))
 
     def released(self, way: Way) -> list[bytes]:
-        """Return what is due."""
+        """Return the delayed pieces that are due now."""
         if way == "up":  # asked first in every period
             self._now += 1
         waiting = self._waiting[way]
@@ -176,7 +176,7 @@ class Reorder(Timed):
     """Keeps a piece back until later ones have overtaken it."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Return the piece, or keep it for later."""
+        """Return the piece, or delay it."""
         if self.rng.random() >= self.number("p"):
             return (piece,)
         self.keep(piece, way, 1 + self.rng.randrange(round(self.number("depth"))))
@@ -193,7 +193,7 @@ class Hold(Timed):
         self._until = self._now + self.periods("ms")
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:
-        """Return nothing while it lasts."""
+        """Return no pieces while the fault is active."""
         if self._now >= self._until:
             return (piece,)
         self.keep(piece, way, self._until - self._now)

@@ -1,4 +1,4 @@
-"""What a rig says of its device."""
+"""The settings of a rig that concern its device."""
 
 from __future__ import annotations
 

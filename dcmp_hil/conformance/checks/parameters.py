@@ -59,7 +59,7 @@ def read(client: Client) -> Iterator[str]:
 
 
 def unknown(client: Client) -> Iterator[str]:
-    """Ask for parameters that do not exist."""
+    """Check the answers to requests for parameters that do not exist."""
     session = client.own()
     for number in _UNKNOWN:
         for what, found in (
@@ -96,7 +96,7 @@ def _tried(client: Client, session: int, parameter: Parameter, value: int, expec
 
 
 def read_only(client: Client) -> Iterator[str]:
-    """Try to set what cannot be set."""
+    """Check that read-only parameters cannot be set."""
     session = client.own()
     for parameter in _READ_ONLY:
         value = client.value(parameter)

@@ -7,7 +7,7 @@ from dcmp_hil.values import Estimate, Reference
 
 
 class Controller(Protocol):
-    """What the loop asks of a controller."""
+    """Protocol of a controller: reference and estimate in, voltage out."""
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
         """Return the voltage to ask for, V; both arguments hold for the instant at which it takes effect."""

@@ -8,7 +8,7 @@ from dcmp_hil.values import Estimate, Sample
 
 
 class Observer(Protocol):
-    """What the loop asks of an observer."""
+    """Protocol of an observer: sample in, estimate out."""
 
     def update(self, sample: Sample) -> Estimate:
         """Take the next sample and return the estimate at `sample.t`."""

@@ -59,7 +59,7 @@ class KnownFriction:
         return check(sample, estimate) if check else None
 
     def retune(self, tuning: Tuning) -> None:
-        """Retune the observer that finds the rest."""
+        """Retune the inner observer, which estimates the rest of the disturbance."""
         self._observer.retune(tuning)  # type: ignore[attr-defined]
 
     def _friction(self, t: float) -> float:

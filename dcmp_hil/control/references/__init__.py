@@ -9,7 +9,7 @@ from dcmp_hil.values import Reference
 
 
 class ReferenceSource(Protocol):
-    """What the trajectory asks of a reference."""
+    """Protocol of a reference: time in, position, velocity and acceleration out."""
 
     def at(self, t: float) -> Reference:
         """Return where the arm should be `t` seconds after the start."""

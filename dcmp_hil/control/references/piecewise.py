@@ -9,7 +9,7 @@ from dcmp_hil.values import Reference
 
 
 class Hold(ReferenceSettings):
-    """One position, held."""
+    """A reference at one constant position."""
 
     kind: Literal["hold"]
     position_rad: float = 0.0
