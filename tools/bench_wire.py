@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import serial
 
 from dcmp_hil import load_rig
-from dcmp_hil.device.serial_link import SerialLink
+from dcmp_hil.device.links.serial import SerialLink
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack, unpack

@@ -7,9 +7,9 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.conformance.check import CAN, COBS, SLCAN
-from dcmp_hil.device.can_link import CanLink
-from dcmp_hil.device.failures import reason
-from dcmp_hil.device.serial_link import FAILURES, open_port, path_of, write_now
+from dcmp_hil.device.links.can import CanLink
+from dcmp_hil.device.links.port_errors import reason
+from dcmp_hil.device.links.serial import FAILURES, open_port, path_of, write_now
 from dcmp_hil.errors import LinkError
 from dcmp_hil.wire import cobs, slcan
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from dcmp_hil.device.kinds import KINDS
+from dcmp_hil.device.links.registry import KINDS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.platform.clock import SimulatedClock

@@ -20,7 +20,7 @@ from dcmp_hil.wire.messages import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message

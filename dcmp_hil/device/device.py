@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.quality import Concern, LinkCounters

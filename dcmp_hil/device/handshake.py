@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dcmp_hil.device.caller import Caller
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.device.terms import Terms
     from dcmp_hil.errors import OpenError
     from dcmp_hil.platform.clock import Clock

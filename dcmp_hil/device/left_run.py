@@ -10,7 +10,7 @@ from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import SampleReport, State
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
 
 _OTHER_FAULT = 7  # fault_class that only says: see FAULT

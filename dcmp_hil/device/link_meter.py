@@ -9,7 +9,7 @@ from dcmp_hil.device.clock_ratio import ClockRatio
 from dcmp_hil.wire.quality import LinkCounters, growth
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.wire.messages import Health, SampleReport
 
 _LATE = 0.5  # of a period

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device.serial_link import open_port
+from dcmp_hil.device.links.serial import open_port
 from dcmp_hil.ipc.mailbox import SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED

@@ -15,7 +15,7 @@ import pytest
 
 from dcmp_hil.device.device import DeviceBackend
 from dcmp_hil.device.history import History
-from dcmp_hil.device.serial_link import SerialLink
+from dcmp_hil.device.links.serial import SerialLink
 from dcmp_hil.errors import OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.session import Session

@@ -10,7 +10,7 @@ import termios
 
 import pytest
 
-from dcmp_hil.device.failures import cannot_open, holder
+from dcmp_hil.device.links.port_errors import cannot_open, holder
 
 
 @pytest.mark.parametrize(

@@ -11,19 +11,19 @@ import pytest
 import serial
 
 from dcmp_hil.config.backends import Can
-from dcmp_hil.device.can_link import CanLink
-from dcmp_hil.device.serial_link import SerialLink
+from dcmp_hil.device.links.can import CanLink
+from dcmp_hil.device.links.serial import SerialLink
 from dcmp_hil.errors import ConfigError, DcmpError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 from tests.backends.line import line
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
 
 CARRIERS = pytest.mark.parametrize("carrier", ["cobs", "slcan"])
 OPENING = {"cobs": b"\0", "slcan": b"\rC\rS8\rN\rO\r"}
 CLOSING = {"cobs": b"", "slcan": b"C\r"}
-MODULE = {"cobs": "serial_link", "slcan": "slcan_bus"}
+MODULE = {"cobs": "links.serial", "slcan": "links.slcan"}
 
 
 def link_to(path: str, carrier: str, *, listen_only: bool = False) -> Link:

@@ -11,7 +11,7 @@ import can
 import pytest
 
 from dcmp_hil.config.backends import Can
-from dcmp_hil.device.can_link import CanLink
+from dcmp_hil.device.links.can import CanLink
 from dcmp_hil.errors import LinkError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 

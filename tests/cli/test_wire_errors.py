@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 import serial
 
-from dcmp_hil.device import serial_link
+from dcmp_hil.device.links import serial as serial_link
 from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump
 from tests.helpers import bench

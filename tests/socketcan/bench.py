@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 from dcmp_hil import load_rig
 from dcmp_hil.config.backends import Can
-from dcmp_hil.device.can_link import open_can
+from dcmp_hil.device.links.can import open_can
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device.can_link import CanLink
+from dcmp_hil.device.links.can import CanLink
 from dcmp_hil.errors import LinkError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault

@@ -11,11 +11,11 @@ import can
 import serial
 
 from dcmp_hil.config.backends import Can as CanSettings
-from dcmp_hil.device import socketcan
 from dcmp_hil.device.device import DeviceBackend
-from dcmp_hil.device.failures import reason
-from dcmp_hil.device.serial_link import path_of
-from dcmp_hil.device.slcan_bus import SlcanBus
+from dcmp_hil.device.links import socketcan
+from dcmp_hil.device.links.port_errors import reason
+from dcmp_hil.device.links.serial import path_of
+from dcmp_hil.device.links.slcan import SlcanBus
 from dcmp_hil.errors import ConfigError, DcmpError, LinkError, OpenError
 
 if TYPE_CHECKING:

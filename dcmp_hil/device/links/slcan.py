@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import can
 
-from dcmp_hil.device.serial_link import FAILURES, open_port, write_now
+from dcmp_hil.device.links.serial import FAILURES, open_port, write_now
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.carriers import has_samples

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device.kinds import LINKS
+from dcmp_hil.device.links.registry import LINKS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named
 
 if TYPE_CHECKING:
     from dcmp_hil.common.section import Section
-    from dcmp_hil.device.link import Link
+    from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
 
 

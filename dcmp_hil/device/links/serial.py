@@ -14,7 +14,7 @@ from serial.tools import list_ports
 
 from dcmp_hil.config.backends import Serial as SerialSettings
 from dcmp_hil.device.device import DeviceBackend
-from dcmp_hil.device.failures import cannot_open, reason
+from dcmp_hil.device.links.port_errors import cannot_open, reason
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.wire import cobs, slcan
