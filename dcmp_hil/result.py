@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.device.goodbye import DeviceEnd
+    from dcmp_hil.device.disarm import DeviceEnd
     from dcmp_hil.platform.realtime import Grant
     from dcmp_hil.safety.polarity_check import MotorGain
     from dcmp_hil.telemetry.statistics import Summary

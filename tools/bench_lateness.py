@@ -19,7 +19,7 @@ import numpy as np
 
 from dcmp_hil import load_rig, loop
 from dcmp_hil.assembly import assemble
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.session import Session
 from dcmp_hil.wire import cobs

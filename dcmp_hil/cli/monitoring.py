@@ -9,10 +9,10 @@ from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.streams import output_failed
-from dcmp_hil.device.caller import Caller
+from dcmp_hil.device.client import Caller
 from dcmp_hil.device.discovery import state_in_words
 from dcmp_hil.device.links.factory import make_link
-from dcmp_hil.device.tick_watch import TickWatch
+from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.values import Fault

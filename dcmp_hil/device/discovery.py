@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from dcmp_hil.config.backends import Can, Serial
-from dcmp_hil.device.caller import Caller
-from dcmp_hil.device.history import history_of
+from dcmp_hil.device.boot_history import history_of
+from dcmp_hil.device.client import Caller
 from dcmp_hil.device.links.factory import make_link
-from dcmp_hil.device.tick_watch import TickWatch
+from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.wire.messages import Hello, Identity, SampleReport, State

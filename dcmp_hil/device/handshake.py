@@ -7,11 +7,11 @@ import math
 import secrets
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.device import refusals
-from dcmp_hil.device.caller import PATIENCE
-from dcmp_hil.device.clearing import Clearing
-from dcmp_hil.device.comparison import differences, remarks
-from dcmp_hil.device.history import history_of
+from dcmp_hil.device import open_errors
+from dcmp_hil.device.boot_history import history_of
+from dcmp_hil.device.client import PATIENCE
+from dcmp_hil.device.compatibility import differences, remarks
+from dcmp_hil.device.fault_clearing import Clearing
 from dcmp_hil.device.parameters import Parameters
 from dcmp_hil.errors import BackendError, ConfigError
 from dcmp_hil.safety.device_faults import meaning_of
@@ -33,9 +33,9 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.client import Caller
+    from dcmp_hil.device.device_config import Terms
     from dcmp_hil.device.links.base import Link
-    from dcmp_hil.device.terms import Terms
     from dcmp_hil.errors import OpenError
     from dcmp_hil.platform.clock import Clock
 
@@ -117,7 +117,7 @@ class Handshake:
             self._check_cold()
             arming = True
             self._arm()
-        except refusals.NoAnswerError as error:
+        except open_errors.NoAnswerError as error:
             self._give_back()
             raise self._blamed(error) from error
         except BaseException as error:  # Ctrl-C too
@@ -138,7 +138,7 @@ class Handshake:
         here, there = self._damaged - self._damaged_before, self._caller.damaged_there
         if max(here, there) < _MANY_DAMAGED:
             return error
-        return refusals.damaged(self._link.name, here, there, error)
+        return open_errors.damaged(self._link.name, here, there, error)
 
     def _stop(self) -> None:
         """Leave nothing armed; the end of a run that a person asked for here is cleared by the next start."""
@@ -159,12 +159,14 @@ class Handshake:
             return
         name = self._link.name
         if caller.heard:
-            raise refusals.no_samples(name, wait, " and ".join(kind.upper() for kind in sorted(caller.heard)))
+            raise open_errors.no_samples(
+                name, wait, " and ".join(kind.upper() for kind in sorted(caller.heard))
+            )
         if caller.nodes:
-            raise refusals.other_node(name, self._terms.node, caller.nodes)
+            raise open_errors.other_node(name, self._terms.node, caller.nodes)
         if self._link.corrupt or caller.corrupt:
-            raise refusals.only_damage(name, self._link.other_carrier)
-        raise refusals.silence(name, wait)
+            raise open_errors.only_damage(name, self._link.other_carrier)
+        raise open_errors.silence(name, wait)
 
     def _introduce(self) -> str:
         """Become the owner, confirmed by two answers: on a bus an IDENTITY may answer another host."""
@@ -182,8 +184,8 @@ class Handshake:
                 return firmware
         self._check_alone()
         if identity is not None and identity.mismatch:
-            raise refusals.impossible(self._link.name, "that this host's protocol is not its own; it is")
-        raise refusals.owned(self._link.name)
+            raise open_errors.impossible(self._link.name, "that this host's protocol is not its own; it is")
+        raise open_errors.owned(self._link.name)
 
     def _ask_who(self) -> Identity:
         """Ask with HELLO; where all fell silent meanwhile, a board boots because its port was opened."""
@@ -195,15 +197,15 @@ class Handshake:
                 return identity
             booted = self._clock.now_ns() >= self._booted_ns
             if booted or self._caller.heard[SampleReport.__name__] != before:
-                raise refusals.deaf(self._link.name)
+                raise open_errors.deaf(self._link.name)
             self._listen()
 
     def _check_identity(self, identity: Identity, firmware: str) -> None:
         name = self._link.name
         if identity.protocol_hash != PROTOCOL_HASH:
-            raise refusals.other_protocol(name, firmware, identity.protocol_hash)
+            raise open_errors.other_protocol(name, firmware, identity.protocol_hash)
         if identity.owned and identity.busy:
-            raise refusals.impossible(name, "that this host owns it and another one does")
+            raise open_errors.impossible(name, "that this host owns it and another one does")
 
     def _compare(self, found: Mapping[Parameter, int]) -> list[str]:
         """Hold the rig against the device, every difference at once; return what is worth a remark."""
@@ -221,7 +223,7 @@ class Handshake:
             if best <= _SLOWEST + 1e-6 * self._terms.period_us:
                 break
         else:
-            raise refusals.slow(self._link.name, best)
+            raise open_errors.slow(self._link.name, best)
         if waited:
             self._introduce()  # that may have cost the session
 
@@ -231,7 +233,7 @@ class Handshake:
         if ticks.suspicious:
             self._caller.listen(max(_TWINS_S, _LATE * 1e-6 * self._terms.period_us))
         if ticks.two_devices:
-            raise refusals.two_devices(self._link.name, self._terms.node)
+            raise open_errors.two_devices(self._link.name, self._terms.node)
 
     def _check_cold(self) -> None:
         """Refuse a device that puts out a voltage before it is armed."""
@@ -241,7 +243,7 @@ class Handshake:
             if sample is None or sample.state == State.RUN or sample.voltage_mV == 0:
                 return
             said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed"
-        raise refusals.impossible(self._link.name, said)
+        raise open_errors.impossible(self._link.name, said)
 
     def _clearing(self) -> Clearing:
         return Clearing(
@@ -265,7 +267,7 @@ class Handshake:
         self._check_alone()
         sample = self._caller.sample
         state = State(sample.state).name if sample and sample.state in set(State) else "an unknown state"
-        raise refusals.not_armed(self._link.name, state, PATIENCE)
+        raise open_errors.not_armed(self._link.name, state, PATIENCE)
 
     def _say(self, *, arm: bool = False, release: bool = False) -> None:
         seq = self._caller.tick & 0x1FFF
@@ -280,7 +282,7 @@ class Handshake:
                 continue
             if _EARLY <= self._caller.tick - told <= _LATE:
                 return
-        raise refusals.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
+        raise open_errors.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
 
 
 def _about(cleared: str) -> tuple[str, ...]:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device import refusals
-from dcmp_hil.device.caller import PATIENCE
-from dcmp_hil.device.comparison import COMPARED, is_possible
+from dcmp_hil.device import open_errors
+from dcmp_hil.device.client import PATIENCE
+from dcmp_hil.device.compatibility import COMPARED, is_possible
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, ParameterValue, Result
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.caller import Caller
-    from dcmp_hil.device.terms import Terms
+    from dcmp_hil.device.client import Caller
+    from dcmp_hil.device.device_config import Terms
 
 _LOOKS = 3  # at a count before it is taken for the arm's
 _COUNTS = 2**24  # of a SAMPLE
@@ -46,9 +46,9 @@ class Parameters:
         """
         found = self._ask(ParameterGet(parameter))
         if found is None or found.result != Result.OK:
-            raise refusals.not_told(self._name, parameter.name)
+            raise open_errors.not_told(self._name, parameter.name)
         if not is_possible(parameter, found.value):
-            raise refusals.impossible(self._name, f"{parameter.name} = {found.value}")
+            raise open_errors.impossible(self._name, f"{parameter.name} = {found.value}")
         return found.value
 
     def compared(self) -> dict[Parameter, int]:
@@ -93,13 +93,13 @@ class Parameters:
         for parameter, value in asked.items():
             kept = self.get(parameter)
             if kept != value:
-                raise refusals.not_kept(self._name, parameter.name, value, kept)
+                raise open_errors.not_kept(self._name, parameter.name, value, kept)
         return zero
 
     def _put(self, parameter: Parameter, value: int) -> None:
         found = self._ask(ParameterSet(self._session, parameter, value))
         if found is None or found.result != Result.OK or found.value != value:
-            raise refusals.not_taken(self._name, parameter.name, value, found)
+            raise open_errors.not_taken(self._name, parameter.name, value, found)
 
     def _hanging(self) -> int:
         """Return the count of an arm that hangs now: the middle one of three, so that a wrong one is none."""
@@ -107,7 +107,7 @@ class Parameters:
         while len(counts) < _LOOKS:
             sample = self._caller.hear_sample(PATIENCE)
             if sample is None:
-                raise refusals.no_samples(self._name, PATIENCE, "nothing")
+                raise open_errors.no_samples(self._name, PATIENCE, "nothing")
             counts.append(nearest(counts[0] if counts else 0, sample.position_counts, 24))
         return sorted(counts)[_LOOKS // 2] % _COUNTS
 

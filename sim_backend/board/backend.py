@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.backends import SimBoard
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire import cobs, slcan
 from sim_backend.board.board import Board

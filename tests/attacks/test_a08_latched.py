@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device.device import DeviceBackend
-from dcmp_hil.device.history import History
+from dcmp_hil.device.backend import DeviceBackend
+from dcmp_hil.device.boot_history import History
 from dcmp_hil.device.links.serial import SerialLink
 from dcmp_hil.errors import OpenError
 from dcmp_hil.platform.clock import MonotonicClock

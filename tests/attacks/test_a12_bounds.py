@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil import load_rig
-from dcmp_hil.device import refusals
+from dcmp_hil.device import open_errors
 from dcmp_hil.errors import ConfigError, OpenError
 from dcmp_hil.live.settable import changed
 from dcmp_hil.platform.host_info import contention
@@ -173,9 +173,9 @@ def test_contention_is_told_where_more_threads_run_than_processors(
 
 
 def test_silent_device_names_the_busy_computer_before_the_cable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dcmp_hil.device.refusals.contention", lambda: "11 threads want its 2 processors")
-    said = str(refusals.no_sample("/dev/ttyACM0", 0.02, 0, 0))
+    monkeypatch.setattr("dcmp_hil.device.open_errors.contention", lambda: "11 threads want its 2 processors")
+    said = str(open_errors.no_sample("/dev/ttyACM0", 0.02, 0, 0))
     assert "busy: 11 threads want its 2 processors" in said
     assert said.index("busy") < said.index("cable")
-    monkeypatch.setattr("dcmp_hil.device.refusals.contention", lambda: "")
-    assert "busy" not in str(refusals.no_sample("/dev/ttyACM0", 0.02, 0, 0))
+    monkeypatch.setattr("dcmp_hil.device.open_errors.contention", lambda: "")
+    assert "busy" not in str(open_errors.no_sample("/dev/ttyACM0", 0.02, 0, 0))

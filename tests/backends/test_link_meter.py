@@ -7,7 +7,7 @@ import random
 import pytest
 
 from dcmp_hil.device.clock_ratio import ClockRatio
-from dcmp_hil.device.tick_watch import TickWatch
+from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.wire.messages import SampleReport, State
 
 PERIOD = 1e6  # ns

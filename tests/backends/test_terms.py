@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dcmp_hil.device.terms import Terms
+from dcmp_hil.device.device_config import Terms
 from dcmp_hil.errors import ConfigError
 from tests.helpers import bench
 

@@ -123,7 +123,7 @@ def test_wrong_baud_shows_as_damaged_frames(cli: Cli) -> None:
 
 
 def test_wrong_firmware(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    for room in ("handshake", "refusals"):
+    for room in ("handshake", "open_errors"):
         monkeypatch.setattr(f"dcmp_hil.device.{room}.PROTOCOL_HASH", 0x0BADCAFE)
     with device() as pump:
         outcome = start(cli, path_of(pump))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.device import open_backend
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board

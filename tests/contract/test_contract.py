@@ -310,7 +310,7 @@ def test_host_that_does_not_fit_gives_the_device_back_at_once(kind: str) -> None
 @wired
 def test_other_protocol_is_refused_with_both_versions(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dcmp_hil.device.handshake.PROTOCOL_HASH", 0x12345678)
-    monkeypatch.setattr("dcmp_hil.device.refusals.PROTOCOL_HASH", 0x12345678)
+    monkeypatch.setattr("dcmp_hil.device.open_errors.PROTOCOL_HASH", 0x12345678)
     with on_bench(kind) as bench:
         with pytest.raises(OpenError) as caught:
             bench.make().__enter__()

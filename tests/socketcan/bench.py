@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from dcmp_hil.device.device import DeviceBackend
+    from dcmp_hil.device.backend import DeviceBackend
 
 RIG = "bench-can"
 WATCHDOG_MS, BRISK_HZ = 20, 250  # of the shipped rig; slower than that, for runs in which other things count

@@ -12,7 +12,7 @@ from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.device import DeviceBackend
+    from dcmp_hil.device.backend import DeviceBackend
     from tests.stateful.judge import Judge
 
 SETTLE, ENGAGE, STOP = 0.005, 0.01, 0.05  # s

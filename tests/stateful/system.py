@@ -9,7 +9,7 @@ import secrets
 from typing import TYPE_CHECKING, NamedTuple
 from unittest.mock import patch
 
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis.stateful import run_state_machine_as_test
 
-from dcmp_hil.device.device import DeviceBackend
-from dcmp_hil.device.goodbye import Goodbye
+from dcmp_hil.device.backend import DeviceBackend
+from dcmp_hil.device.disarm import Goodbye
 from dcmp_hil.safety.limits import Limits
 from dcmp_hil.safety.monitors import Finite
 from dcmp_hil.safety.supervisor import TABLE, Cue, Phase, Supervisor

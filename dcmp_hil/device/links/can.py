@@ -11,7 +11,7 @@ import can
 import serial
 
 from dcmp_hil.config.backends import Can as CanSettings
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.links import socketcan
 from dcmp_hil.device.links.port_errors import reason
 from dcmp_hil.device.links.serial import path_of

@@ -13,7 +13,7 @@ import serial
 from serial.tools import list_ports
 
 from dcmp_hil.config.backends import Serial as SerialSettings
-from dcmp_hil.device.device import DeviceBackend
+from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.links.port_errors import cannot_open, reason
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks

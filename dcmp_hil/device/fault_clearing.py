@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device import refusals
-from dcmp_hil.device.caller import PATIENCE
+from dcmp_hil.device import open_errors
+from dcmp_hil.device.client import PATIENCE
 from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, State, StopReason
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.client import Caller
     from dcmp_hil.platform.clock import Clock
 
 _REPORT = 0.25  # s: FAULT comes every 100 ms
@@ -66,7 +66,7 @@ class Clearing:
         if not code:
             return ""
         if not self._allowed and self._waits_for_person(code):
-            raise refusals.latched(self._name, code)
+            raise open_errors.latched(self._name, code)
         clear = False
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
@@ -79,7 +79,7 @@ class Clearing:
             seq = self._caller.tick & _SEQ
             self._caller.say(Drive(0, seq, False, clear, False, self._session, self._ttl_ms))
             clear = not clear
-        raise refusals.faulty(self._name, name_of(code))
+        raise open_errors.faulty(self._name, name_of(code))
 
     def _named(self) -> int:
         """Return the code of the fault that is latched; 0 if none is."""
@@ -106,6 +106,6 @@ class Clearing:
         sample, told = self._caller.sample, self._caller.fault
         seen = sample.fault_class if sample is not None else 0
         if told not in {0, code}:
-            raise refusals.other_fault(self._name, name_of(code), name_of(told))
+            raise open_errors.other_fault(self._name, name_of(code), name_of(told))
         if code != Fault.UNKNOWN and seen != min(code, _OTHER):
-            raise refusals.other_fault(self._name, name_of(code), name_of(seen))
+            raise open_errors.other_fault(self._name, name_of(code), name_of(seen))

@@ -10,7 +10,7 @@ from dcmp_hil.wire.messages import Parameter
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.terms import Terms
+    from dcmp_hil.device.device_config import Terms
 
 _INT = 2**31 - 1
 RANGES = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from dcmp_hil.device.tick_watch import TickWatch
+from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (

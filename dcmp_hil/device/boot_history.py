@@ -9,7 +9,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterValue, Result
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.client import Caller
 
 _CAUSES = ("unknown", "power", "reset pin", "software", "watchdog", "brown-out")
 _WATCHDOG, _BROWN_OUT = 4, 5

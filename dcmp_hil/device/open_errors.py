@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device.caller import LONGEST_TRIP
+from dcmp_hil.device.client import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
 from dcmp_hil.platform.host_info import contention
 from dcmp_hil.safety.device_faults import meaning_of, name_of

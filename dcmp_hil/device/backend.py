@@ -6,13 +6,13 @@ import math
 from typing import TYPE_CHECKING, NoReturn, Self
 
 from dcmp_hil.common.fast_tuple import make
-from dcmp_hil.device import refusals
-from dcmp_hil.device.caller import MOST_WAITING, Caller
-from dcmp_hil.device.goodbye import DeviceEnd, Goodbye
+from dcmp_hil.device import open_errors
+from dcmp_hil.device.client import MOST_WAITING, Caller
+from dcmp_hil.device.device_config import Terms
+from dcmp_hil.device.disarm import DeviceEnd, Goodbye
 from dcmp_hil.device.handshake import Handshake
-from dcmp_hil.device.left_run import another_runs, why_left
-from dcmp_hil.device.link_meter import LinkMeter
-from dcmp_hil.device.terms import Terms
+from dcmp_hil.device.link_statistics import LinkMeter
+from dcmp_hil.device.run_exit import another_runs, why_left
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
@@ -170,7 +170,7 @@ class DeviceBackend:
         report = self._next_report()
         _, voltage_mV, _, state, _, _, _ = report
         if state == _RUN and self._tick - self._answered > self._memory:
-            raise refusals.taken_over(self._link.name)
+            raise open_errors.taken_over(self._link.name)
         terms = self._terms
         position = (self._count - self._zero) * terms.rad_per_count
         fault = _HEALTHY if state == _RUN else self._fault_in(report, last)
@@ -194,7 +194,7 @@ class DeviceBackend:
     def _give_up_after(self, gap_ns: int) -> NoReturn:
         """Stop counting periods after a gap that is too long to count; the device has its watchdog."""
         self._forgotten = gap_ns > _SURELY_NS
-        raise refusals.stood_still(self._link.name, 1e-9 * gap_ns)
+        raise open_errors.stood_still(self._link.name, 1e-9 * gap_ns)
 
     def _next_report(self) -> SampleReport:
         """Wait for a SAMPLE; where several are waiting, the newest."""
@@ -281,7 +281,7 @@ class DeviceBackend:
 
     def _give_up(self, damaged: int, stale: int) -> NoReturn:
         self._link.send(pack(Stop(StopReason.NO_SAMPLE), self._node))
-        raise refusals.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
+        raise open_errors.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
 
     def _leave(self, error: BaseException | None) -> None:
         """Disarm the device; send STOP instead after a trip, or if the device does not answer."""
@@ -297,4 +297,4 @@ class DeviceBackend:
         self._meter.take_health(caller.health)
         if self.device_end is None:
             caller.say(Stop(StopReason.NO_SAMPLE))
-            raise refusals.not_confirmed(self._link.name, self._ttl_ms)
+            raise open_errors.not_confirmed(self._link.name, self._ttl_ms)

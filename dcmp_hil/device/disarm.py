@@ -9,7 +9,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, Health, State
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.caller import Caller
+    from dcmp_hil.device.client import Caller
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.messages import SampleReport
 
