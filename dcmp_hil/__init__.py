@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dcmp_hil.api import run
+    from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig, load_rig
     from dcmp_hil.control.controllers import Controller, ControllerContext
     from dcmp_hil.control.model import Model
     from dcmp_hil.control.observers import Observer, ObserverContext
-    from dcmp_hil.device import Backend
     from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Backend": "dcmp_hil.device",
+    "Backend": "dcmp_hil.backend",
     "BackendError": "dcmp_hil.errors",
     "Clock": "dcmp_hil.platform.clock",
     "ConfigError": "dcmp_hil.errors",

@@ -13,7 +13,7 @@ from dcmp_hil.control.observers.known_friction import KnownFriction
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory
-from dcmp_hil.device import open_backend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line

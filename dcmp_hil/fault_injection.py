@@ -9,10 +9,10 @@ from dcmp_hil.plugins import find_named
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.device import Backend
     from dcmp_hil.platform.clock import Clock
 
 _Stage = TypeVar("_Stage")

@@ -11,11 +11,11 @@ from dcmp_hil.live.changes import NoChanges
 from dcmp_hil.values import Cycle, Timing
 
 if TYPE_CHECKING:
+    from dcmp_hil.backend import Backend
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.predictor import Predictor
     from dcmp_hil.control.trajectory import Trajectory
-    from dcmp_hil.device import Backend
     from dcmp_hil.live.changes import Changes
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.safety.deadline_monitor import Overruns

@@ -14,8 +14,8 @@ from dcmp_hil.safety.speed_resolution import resolution
 from tests.attacks.hostile.wrong_observers import KINDS
 
 if TYPE_CHECKING:
+    from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig
-    from dcmp_hil.device import Backend
     from dcmp_hil.values import Sample, Truth
     from sim_backend.board.board import Board
 

@@ -17,7 +17,7 @@ import pytest
 
 from dcmp_hil.config import load_rig
 from dcmp_hil.config.backends import Can, Serial
-from dcmp_hil.device import open_backend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack

@@ -7,8 +7,8 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.device import open_backend
 from dcmp_hil.device.backend import DeviceBackend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board
@@ -19,8 +19,8 @@ from tests.helpers import bench
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig
-    from dcmp_hil.device import Backend
 
 IN_PROCESS = (
     *("sim-board cobs", "sim-board slcan", "sim-board can"),

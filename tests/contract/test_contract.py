@@ -24,7 +24,7 @@ from tests.contract.hooks import Doubler, Dropper, Flipper, Swapper, on_way_down
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dcmp_hil.device import Backend
+    from dcmp_hil.backend import Backend
     from dcmp_hil.values import Sample
     from tests.contract.benches import Bench
     from tests.contract.hooks import Chunk

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device import open_backend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.errors import ConfigError, LinkError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.values import Fault

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device import open_backend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire.messages import Parameter
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig
-    from dcmp_hil.device import Backend
     from dcmp_hil.values import Sample
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.device import open_backend
+from dcmp_hil.device.factory import open_backend
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
