@@ -26,8 +26,8 @@ from sim_backend.board.board import Board
 from tests.backends.line import line
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import PatientClock, on_bench
+from tests.contract.driving import drive
 from tests.contract.pump import Pump, VirtualBus
-from tests.contract.test_contract import drive
 from tests.firmware.core_library import compiler
 from tests.helpers import bench
 

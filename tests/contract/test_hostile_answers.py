@@ -21,8 +21,8 @@ from dcmp_hil.wire.messages import (
     StopReason,
 )
 from tests.contract.benches import on_bench
+from tests.contract.driving import at_rest, drive
 from tests.contract.hooks import on_way_down
-from tests.contract.test_contract import at_rest, drive
 from tests.firmware.core_library import compiler
 
 if TYPE_CHECKING:
