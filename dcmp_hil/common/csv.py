@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, TextIO
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _MOST_FAULTS = 5  # named one by one; the rest are counted
 _LONGEST_SHOWN = 40  # characters of a field
 _DELIMITERS = ",;\t"
+_FILE_MAX_MIB = 16  # a reference has a row a corner, not a row a period
 
 
 class Text(NamedTuple):
@@ -84,11 +86,16 @@ def read_text(path: Path) -> Text:
     Raises
     ------
     ConfigError
-        If the file is missing, no text, no CSV, or has no header.
+        If the file is missing, too long, no text, no CSV, or has no header.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            header, rows, lines = _split(file)
+        with path.open("rb") as file:
+            raw = file.read((_FILE_MAX_MIB << 20) + 1)
+        if len(raw) > _FILE_MAX_MIB << 20:
+            raise ConfigError(
+                f"{path}: more than {_FILE_MAX_MIB} MiB, which no table of points is. Check the path."
+            )
+        header, rows, lines = _split(io.StringIO(raw.decode("utf-8-sig"), newline=""))
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Check the path and its permissions.") from None
     except (ValueError, csv.Error) as error:  # no UTF-8, a NUL in the path, an open quote

@@ -118,6 +118,26 @@ def test_hostile_table_is_a_short_sentence(name: str, script: Script, tmp_path: 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["it.csv"]
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("replay", "/dev/zero"),
+        ("replay", "it.csv"),
+        ("check", "bench-1khz", "--set", "reference.kind=table", "--set", "reference.file=/dev/zero"),
+        ("check", "/dev/zero"),
+        ("export", "/dev/zero", "--csv", "out.csv"),
+    ],
+)
+def test_file_without_an_end_is_refused(arguments: tuple[str, ...], script: Script, tmp_path: Path) -> None:
+    (tmp_path / "it.csv").symlink_to("/dev/zero")
+    done = script(*arguments, cwd=tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("error: ")
+    assert "Traceback" not in done.err
+    assert len(done.err) < 1_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["it.csv"]
+
+
 def test_escapes_of_a_file_are_shown_and_not_carried_out(script: Script, tmp_path: Path) -> None:
     (tmp_path / "it.mcap").write_bytes(recordings()["run of escapes"])
     done = script("replay", "it.mcap", cwd=tmp_path)
