@@ -17,8 +17,8 @@ from dcmp_hil.cli.onlookers import dashboard, recording
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
-from dcmp_hil.telemetry.rig_view import view_of
-from dcmp_hil.telemetry.viewer import free_port
+from dcmp_hil.telemetry.rerun.rig_view import view_of
+from dcmp_hil.telemetry.rerun.viewer import free_port
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing
 
 if TYPE_CHECKING:

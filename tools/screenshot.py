@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil.platform.clock import MonotonicClock, pause
-from dcmp_hil.telemetry.viewer import (
+from dcmp_hil.telemetry.rerun.viewer import (
     LOOPBACK,
     answers,
     free_port,

@@ -33,10 +33,10 @@ from dcmp_hil.live.process import ControlProcess
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.makers import sorted_out
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.rig_view import view_of
+from dcmp_hil.telemetry.rerun.sink import RerunSink
+from dcmp_hil.telemetry.rerun.viewer import free_port
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.telemetry.viewer import free_port
 from dcmp_hil.values import ChangeData, Event, EventKind, LinkData
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import sys
 import threading
 
 from dcmp_hil.cli import console
-from dcmp_hil.telemetry.outlet import THREAD
+from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 
 
 def leave(code: int) -> None:

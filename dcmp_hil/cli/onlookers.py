@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.rerun_sink import Viewer
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.values import Event
 
 
@@ -40,7 +40,7 @@ def recording(path: Path, period: float, run: dict[str, str], rig: str) -> Sink:
 def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:
     """Return the Rerun dashboard, its recording, or both; say where a viewer finds it."""
     from dcmp_hil.cli.watching import watched
-    from dcmp_hil.telemetry.rerun_sink import RerunSink  # takes half a second
+    from dcmp_hil.telemetry.rerun.sink import RerunSink  # takes half a second
 
     use_terminal()
     return watched(RerunSink(view, record, viewer, port=port, spare=True), viewer)

@@ -74,7 +74,7 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
 def _no_library() -> str:
     """Return why the library of Rerun does not load here; nothing if it does."""
     try:
-        import dcmp_hil.telemetry.series  # noqa: F401
+        import dcmp_hil.telemetry.rerun.series  # noqa: F401
     except ImportError as error:
         return str(error)
     return ""

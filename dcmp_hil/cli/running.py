@@ -30,7 +30,7 @@ from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.plugins.exits import exits_named
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.session import Session
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
     from dcmp_hil.telemetry.makers import SinkMaker
-    from dcmp_hil.telemetry.rerun_sink import Viewer
+    from dcmp_hil.telemetry.rerun.sink import Viewer
 
 INCOMPLETE = "recording_incomplete"
 """How a run ended that went well, and is not wholly in its recording."""
@@ -172,7 +172,7 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     viewer = options.viewer or "none"
     own = folder.recording if folder else None
     if options.record is not None or own is not None or viewer != "none":
-        from dcmp_hil.telemetry.rig_view import view_of
+        from dcmp_hil.telemetry.rerun.rig_view import view_of
 
         view = view_of(rig)
         if options.record is not None:

@@ -9,7 +9,7 @@ from dcmp_hil.cli.watching import web_viewer
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import pause
 from dcmp_hil.platform.display import display_problem
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 _PAUSE = 0.5  # s
 

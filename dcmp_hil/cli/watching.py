@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from dcmp_hil.cli import console
 from dcmp_hil.platform.display import display_available, display_problem
 from dcmp_hil.platform.other_users import others_here
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.rerun_sink import RerunSink, Viewer
+    from dcmp_hil.telemetry.rerun.sink import RerunSink, Viewer
     from dcmp_hil.values import Event
 
 _START = 60.0  # s, a far limit: that the pages are served is an event

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def to_parquet(run: RecordedRun, path: Path) -> None:
 
 def to_rrd(run: RecordedRun, path: Path) -> None:
     """Write the dashboard of the run."""
-    from dcmp_hil.telemetry.rerun_sink import RerunSink
+    from dcmp_hil.telemetry.rerun.sink import RerunSink
 
     with _writing(path) as place:
         sink = RerunSink(view_of(run.rig), place, "none")
@@ -85,7 +85,7 @@ def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
 
 def again_to_rrd(run: RecordedRun, again: Again, path: Path) -> None:
     """Write what observer and controller said then and now as a Rerun recording, one plot a signal."""
-    from dcmp_hil.telemetry.series import write_series
+    from dcmp_hil.telemetry.rerun.series import write_series
 
     then = run.columns
     plots = {name: {"recorded": then[name], "again": values} for name, values in _now(again).items()}

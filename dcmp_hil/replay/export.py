@@ -78,7 +78,7 @@ def write_rrd(result: ReplayResult, path: Path) -> None:
     ConfigError
         If the file cannot be written.
     """
-    from dcmp_hil.telemetry.series import write_series
+    from dcmp_hil.telemetry.rerun.series import write_series
 
     recording, estimates, reference = result.recording, result.estimates, result.reference
     name = _INPUT_COLUMN[recording.input_kind]

@@ -27,7 +27,7 @@ from dcmp_hil.platform.heap import trim
 from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
 from dcmp_hil.telemetry.died import how_it_died
 from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
-from dcmp_hil.telemetry.outlet import THREAD
+from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.common.drawing import files_only
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
-from dcmp_hil.telemetry.titles import title
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _BOUND = 120.0  # s: these machines are shared
 _STUCK_IN_C = """
 import ctypes, sys
-from dcmp_hil.telemetry import rerun_sink
+from dcmp_hil.telemetry.rerun import sink as rerun_sink
 def stuck(target, rig, stream):
     print("stuck", file=sys.__stdout__, flush=True)
     libc, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(64)
@@ -41,7 +41,7 @@ main()
 """
 _SERVES = """
 import os, sys, time
-from dcmp_hil.telemetry import viewer
+from dcmp_hil.telemetry.rerun import viewer
 port = viewer.free_port(int(sys.argv[1]))
 process = viewer.start_web_viewer(port, 1)
 print(process.pid, viewer.serves(port, process.pid, 60.0), flush=True)

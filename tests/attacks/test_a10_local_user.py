@@ -23,8 +23,8 @@ from dcmp_hil.live.client import status
 from dcmp_hil.live.places import folder, socket_of
 from dcmp_hil.platform import other_users
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.viewer import answers
+from dcmp_hil.telemetry.rerun.sink import RerunSink
+from dcmp_hil.telemetry.rerun.viewer import answers
 from tests.live.processes import BOUND, own_folder, started, until, until_running
 from tests.panel.test_browser import free_port
 from tests.telemetry.runs import VIEW, blocks, read_back, values

@@ -101,7 +101,7 @@ def test_telemetry_process_does_not_import_what_the_run_does() -> None:
 _STUCK = """
 import sys, threading
 from dcmp_hil.cli import main
-from dcmp_hil.telemetry.outlet import THREAD
+from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 threading.Thread(target=threading.Event().wait, name=THREAD).start()  # never ends, and Python waits
 sys.argv = ["dcmp-hil", *sys.argv[1:]]
 main()

@@ -15,14 +15,14 @@ from dcmp_hil.cli.onlookers import dashboard
 from dcmp_hil.cli.viewing import attach
 from dcmp_hil.cli.watching import chosen, open_browser, pages
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rerun import viewer as window
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dcmp_hil.telemetry.rerun_sink import Viewer
+    from dcmp_hil.telemetry.rerun.sink import Viewer
 
 _FIRST = 25_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # each process its own ports
 

@@ -41,7 +41,7 @@ def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subpro
     """
     ports = f"viewer.PORT = {first}; viewer.served.__defaults__ = ({first},)"
     process = subprocess.Popen(
-        [sys.executable, "-c", f"from dcmp_hil.telemetry import viewer\n{ports}\n{_MAIN}", *arguments],
+        [sys.executable, "-c", f"from dcmp_hil.telemetry.rerun import viewer\n{ports}\n{_MAIN}", *arguments],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         stdout=subprocess.PIPE,

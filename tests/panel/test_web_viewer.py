@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.signals import ERROR, VOLTAGE
 from tests.live.processes import own_folder, started, until, until_running
 from tests.panel.browser import browser, needed

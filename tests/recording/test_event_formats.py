@@ -25,9 +25,9 @@ from dcmp_hil.recording.format_1 import event_of_format_1
 from dcmp_hil.recording.layout import event_from, event_to_bytes
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
-from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.parameters import Parameters
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.frames import Frames
+from dcmp_hil.telemetry.rerun.parameter_table import Parameters
+from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.values import (
     DATA,
     CauseData,
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.telemetry.frames import Call
+    from dcmp_hil.telemetry.rerun.frames import Call
     from dcmp_hil.values import EventData
 
 OLD = Path(__file__).with_name("data") / "format_1.mcap"  # 200 Hz, four changes, lowered at the end

@@ -144,7 +144,7 @@ def test_rrd_is_written_with_every_plot_from_time_zero(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     written: list[tuple[Path, str, np.ndarray, dict[str, dict[str, np.ndarray]]]] = []
-    series = types.ModuleType("dcmp_hil.telemetry.series")
+    series = types.ModuleType("dcmp_hil.telemetry.rerun.series")
 
     def write_series(path: Path, *rest: Any) -> None:
         path.touch()

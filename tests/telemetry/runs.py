@@ -12,7 +12,7 @@ from dcmp_hil.control.model import Model
 from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.block import Aligner, Block
 from dcmp_hil.telemetry.keeper import Keeper
-from dcmp_hil.telemetry.rig_view import RigView
+from dcmp_hil.telemetry.rerun.rig_view import RigView
 from dcmp_hil.values import (
     UNKNOWN_TRUTH,
     Cycle,

@@ -20,7 +20,7 @@ from dcmp_hil import ConfigError, load_rig, run
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import apart as module
 from dcmp_hil.telemetry.apart import Apart
-from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.values import UNKNOWN_TRUTH, Event, EventKind, Reference
 from tests.helpers import bench, cycle
@@ -346,8 +346,8 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from dcmp_hil import load_rig, run
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.sink import RerunSink
+from dcmp_hil.telemetry.rerun.rig_view import view_of
 from tests.telemetry.test_apart import Notes
 rig = load_rig("bench-1khz")
 folder = Path(sys.argv[1])

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,7 +36,7 @@ class Host:
 
     def __init__(self, folder: Path, *options: str) -> None:
         environment = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-        ports = f"from dcmp_hil.telemetry import viewer; viewer.PORT = {_FIRST}"
+        ports = f"from dcmp_hil.telemetry.rerun import viewer; viewer.PORT = {_FIRST}"
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-c", f"{ports}; from dcmp_hil.cli import main; main()", *_RUN, *options],

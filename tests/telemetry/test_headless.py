@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from dcmp_hil.platform.clock import pause
-from dcmp_hil.telemetry import rerun_sink
-from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rerun import sink as rerun_sink
+from dcmp_hil.telemetry.rerun import viewer as window
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
 from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
 from tools import screenshot as screenshots
@@ -143,8 +143,8 @@ def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunS
 _FROZEN = """
 import os, signal, sys
 from pathlib import Path
-from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rerun import viewer as window
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW, blocks
 window.PORT = int(sys.argv[1])
 sink = RerunSink(VIEW, Path(sys.argv[3]), "connect")

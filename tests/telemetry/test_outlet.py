@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from dcmp_hil.telemetry import outlet as module
-from dcmp_hil.telemetry.outlet import Outlet
+from dcmp_hil.telemetry.rerun import stream_worker as module
+from dcmp_hil.telemetry.rerun.stream_worker import Outlet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -123,7 +123,8 @@ def test_what_a_job_raised_reaches_the_next_caller() -> None:
 
 _LAZY = """
 import sys
-from dcmp_hil.telemetry import block, picture, recorder, ring, signals
+from dcmp_hil.ipc import ring
+from dcmp_hil.telemetry import block, picture, recorder, signals
 sys.exit(bool({"rerun", "matplotlib"} & set(sys.modules)))
 """
 

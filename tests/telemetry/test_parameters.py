@@ -9,9 +9,9 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.live.settable import changed
-from dcmp_hil.telemetry.parameters import Parameters
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.parameter_table import Parameters
+from dcmp_hil.telemetry.rerun.rig_view import view_of
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.values import ChangeData, Event, EventKind
 from tests.telemetry.runs import blocks, read_back
 

@@ -17,21 +17,21 @@ from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.ring import FIELDS, Ring
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.telemetry import rerun_sink
-from dcmp_hil.telemetry import viewer as window
 from dcmp_hil.telemetry.audience import Audience
-from dcmp_hil.telemetry.outlet import Outlet
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.plot_labels import title
+from dcmp_hil.telemetry.rerun import sink as rerun_sink
+from dcmp_hil.telemetry.rerun import viewer as window
+from dcmp_hil.telemetry.rerun.rig_view import view_of
+from dcmp_hil.telemetry.rerun.sink import RerunSink
+from dcmp_hil.telemetry.rerun.stream_worker import Outlet
 from dcmp_hil.telemetry.signals import by_plot
-from dcmp_hil.telemetry.titles import title
 from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, cycle, entities, feed, read_back, truth, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from dcmp_hil.telemetry.outlet import Job
+    from dcmp_hil.telemetry.rerun.stream_worker import Job
 
 
 @pytest.fixture(autouse=True)
@@ -266,7 +266,7 @@ _DISK_FULL = """
 import resource, sys
 from contextlib import suppress
 from pathlib import Path
-from dcmp_hil.telemetry.rerun_sink import RerunSink
+from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW, feed
 sink = RerunSink(VIEW, Path(sys.argv[1]), "none")
 resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))

@@ -10,7 +10,7 @@ import pytest
 import rerun as rr
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.series import write_series
+from dcmp_hil.telemetry.rerun.series import write_series
 from tests.telemetry.runs import entities, read_back, values
 
 if TYPE_CHECKING:

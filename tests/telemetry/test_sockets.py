@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 _NEEDS = (
     "a network namespace: as root, or where users may make them (sysctl kernel.unprivileged_userns_clone=1)"
@@ -19,7 +19,7 @@ _NEEDS = (
 _INSIDE = r"""
 import json, subprocess, sys, time
 from pathlib import Path
-from dcmp_hil.telemetry import viewer as window
+from dcmp_hil.telemetry.rerun import viewer as window
 
 subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
 FILES = ("tcp", "tcp6", "udp", "udp6")

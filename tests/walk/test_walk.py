@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.telemetry.viewer import answers
+from dcmp_hil.telemetry.rerun.viewer import answers
 from tests.walk.expected import check
 from tests.walk.selections import combinations, each_once, with_members
 from tests.walk.streams import CLASSES, STREAMS, call

@@ -11,8 +11,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.blueprint import TIMELINE, opened, plot
-from dcmp_hil.telemetry.outlet import THREAD
+from dcmp_hil.telemetry.rerun.blueprint import TIMELINE, opened, plot
+from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, FAINT, REFERENCE, TRUE, VOLTAGE
 
 if TYPE_CHECKING:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.decimation import peaks, rows_per_bucket
-from dcmp_hil.telemetry.histogram import Histogram
-from dcmp_hil.telemetry.lanes import Lane
 from dcmp_hil.telemetry.link import in_order
-from dcmp_hil.telemetry.parameters import PATH, RELATIVE, Parameters, line_of, table_of
-from dcmp_hil.telemetry.portrait import Portrait
-from dcmp_hil.telemetry.scenery import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
+from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
+from dcmp_hil.telemetry.rerun.histogram import Histogram
+from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of
+from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
+from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
+from dcmp_hil.telemetry.rerun.transitions import Lane
 from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.values import LinkData, PhaseData
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.signals import Signal
     from dcmp_hil.values import Event
 

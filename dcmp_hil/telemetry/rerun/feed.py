@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.scenery import log_style
+from dcmp_hil.telemetry.rerun.frames import Frames
+from dcmp_hil.telemetry.rerun.scene import log_style
 from dcmp_hil.values import EventKind
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     import rerun as rr
 
-    from dcmp_hil.telemetry.frames import Call
-    from dcmp_hil.telemetry.outlet import Outlet
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.frames import Call
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.stream_worker import Outlet
     from dcmp_hil.telemetry.signals import Signal
     from dcmp_hil.values import Event
 

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from dcmp_hil.telemetry.link import DEVICE, HOST
-from dcmp_hil.telemetry.parameters import RELATIVE, Parameters, table_of
+from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
 from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.signals import Signal
 
 ARM, GHOST = "rig/arm", "rig/reference"

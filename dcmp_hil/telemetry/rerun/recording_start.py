@@ -9,14 +9,14 @@ import rerun as rr
 
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.blueprint import dashboard
-from dcmp_hil.telemetry.feed import send
-from dcmp_hil.telemetry.frames import Frames
-from dcmp_hil.telemetry.scenery import log_scenery
+from dcmp_hil.telemetry.rerun.blueprint import dashboard
+from dcmp_hil.telemetry.rerun.feed import send
+from dcmp_hil.telemetry.rerun.frames import Frames
+from dcmp_hil.telemetry.rerun.scene import log_scenery
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 
 def begin(

@@ -15,11 +15,18 @@ from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.disk_space import kept_for_data, room_for, short_of
 from dcmp_hil.platform.display import display_problem
 from dcmp_hil.platform.other_users import strangers
-from dcmp_hil.telemetry import viewer as window
-from dcmp_hil.telemetry.beginning import begin, warm_up
-from dcmp_hil.telemetry.feed import Feed
-from dcmp_hil.telemetry.outlet import Outlet
-from dcmp_hil.telemetry.troubles import NO_ROOM, NO_WINDOW, STRANGERS, incomplete, spared, stuck
+from dcmp_hil.telemetry.rerun import viewer as window
+from dcmp_hil.telemetry.rerun.dashboard_warnings import (
+    NO_ROOM,
+    NO_WINDOW,
+    STRANGERS,
+    incomplete,
+    spared,
+    stuck,
+)
+from dcmp_hil.telemetry.rerun.feed import Feed
+from dcmp_hil.telemetry.rerun.recording_start import begin, warm_up
+from dcmp_hil.telemetry.rerun.stream_worker import Outlet
 
 if TYPE_CHECKING:
     import subprocess
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.values import Event
 
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]

@@ -10,7 +10,7 @@ from dcmp_hil.platform.disk_space import room_for
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.telemetry.outlet import Outlet
+    from dcmp_hil.telemetry.rerun.stream_worker import Outlet
 
 _STUCK = (
     "The viewer has taken nothing for seconds and is left behind; the run goes on. "

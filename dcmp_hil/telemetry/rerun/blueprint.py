@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import rerun as rr
 import rerun.blueprint as rrb
 
-from dcmp_hil.telemetry import portrait
-from dcmp_hil.telemetry.parameters import PATH, RELATIVE
-from dcmp_hil.telemetry.scenery import LINK
+from dcmp_hil.telemetry.plot_labels import title
+from dcmp_hil.telemetry.rerun import phase_portrait
+from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE
+from dcmp_hil.telemetry.rerun.scene import LINK
 from dcmp_hil.telemetry.signals import by_plot
-from dcmp_hil.telemetry.titles import title
 
 if TYPE_CHECKING:
-    from dcmp_hil.telemetry.rig_view import RigView
+    from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 TIMELINE = "loop_time"
 _WINDOW = 10.0  # s on the axis of every plot
@@ -119,7 +119,7 @@ def _pendulum(rig: RigView) -> rrb.Spatial3DView:
 
 def _portrait() -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
-        origin=portrait.PATH,
+        origin=phase_portrait.PATH,
         name="Phase portrait",
         background=rrb.Background(color=(15, 17, 20)),
         visual_bounds=rrb.VisualBounds2D(x_range=(-1.5, 1.5), y_range=(-1.45, 1.45)),
