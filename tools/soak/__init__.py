@@ -1,0 +1,1 @@
+"""Hours of a run's data through the real processes, and what their memory does."""

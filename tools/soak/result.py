@@ -1,0 +1,92 @@
+"""What a soak came to, and what of it must not be."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tools.soak.memory import Memory
+
+SLOPE_MB, TOTAL_MB = 0.2, 500.0
+"""What a process may grow by in a simulated minute, and what all may take."""
+
+
+@dataclass(slots=True)
+class Soaked:
+    """What a soak came to.
+
+    Parameters
+    ----------
+    minutes
+        Simulated.
+    wall_s
+        What it took.
+    cpu_s
+        Of each process.
+    memory
+        Of each process.
+    dropped, recorded, written
+        Periods that are in no figure, that are in run.mcap, and that there were.
+    mcap_mb, rrd_mb
+        Size of the files.
+    troubles
+        What the run went on without.
+    """
+
+    minutes: float
+    wall_s: float
+    cpu_s: dict[str, float]
+    memory: Memory
+    dropped: int
+    recorded: int
+    written: int
+    mcap_mb: float
+    rrd_mb: float
+    troubles: list[str]
+
+    def faults(self) -> list[str]:
+        """Return what must not be."""
+        found = [
+            f"{name} grow by {growth.slope():.3f} MB a simulated minute"
+            for name, growth in self.memory.growth.items()
+            if not growth.slope() < SLOPE_MB
+        ]
+        if not self.memory.peak_mb <= TOTAL_MB:
+            found.append(f"all of them take {self.memory.peak_mb:.0f} MB")
+        if self.dropped or self.recorded != self.written:
+            found.append(f"{self.dropped} periods in no figure, {self.written - self.recorded} not recorded")
+        return found + self.troubles
+
+    def document(self) -> dict[str, object]:
+        """Return all of it for a JSON document."""
+        figures = {name: value for name, value in asdict(self).items() if name != "memory"}
+        growth = self.memory.growth.items()
+        return {
+            **figures,
+            "slope_mb_a_minute": {name: one.slope() for name, one in growth},
+            "private_mb": {name: [round(mb, 1) for mb in one.by_minute()] for name, one in growth},
+            "peak_total_mb": self.memory.peak_mb,
+            "mcap_mb_a_minute": self.mcap_mb / self.minutes,
+            "rrd_mb_a_minute": self.rrd_mb / self.minutes,
+        }
+
+
+def size_mb(file: Path) -> float:
+    """Return the size of a file, MB."""
+    return 1e-6 * file.stat().st_size
+
+
+def periods_in(file: Path) -> int:
+    """Count the periods of a recording, as its own end does."""
+    from mcap.reader import make_reader
+
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    if summary is None or summary.statistics is None:
+        return 0
+    topics = {number: channel.topic for number, channel in summary.channels.items()}
+    counts = summary.statistics.channel_message_counts
+    return sum(count for number, count in counts.items() if "cycle" in topics[number])
