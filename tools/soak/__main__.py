@@ -1,7 +1,7 @@
 """`make soak-long`, `make soak`: hours of a run's data by rate, or an hour by the wall clock.
 
-What must hold: no process grows by 0.2 MB or more a simulated minute after the first five, all of them together
-take 500 MB at most, and no period is lost.
+What must hold: no process grows by 0.2 MB or more a simulated minute after the first five, all of them
+together take 500 MB at most, and no period is lost.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """A minute of simulated rows, written into the ring over and over, many times faster than real time.
 
-From there they go their usual way, through the telemetry process (figures, run.mcap, run.rrd, a dashboard that
-is served) and past the control process, which has a watcher. Where a sink is far behind, the source waits, so
-that a busy computer makes a soak longer and loses nothing.
+From there they go their usual way, through the telemetry process (figures, run.mcap, run.rrd, a dashboard
+that is served) and past the control process, which has a watcher. Where a sink is far behind, the source
+waits, so that a busy computer makes a soak longer and loses nothing.
 
-Once a simulated minute the source waits until nothing is on its way any more, and memory is looked at then: up
-to 32 s of data wait before Rerun, 15 MB, and how many at an instant is chance.
+Once a simulated minute the source waits until all rows are in the files, and memory is looked at then: up to
+32 s of data wait for Rerun's thread, 15 MB, and how many at a given instant is chance.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from dcmp_hil.live.process import ControlProcess
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.telemetry.apart import Apart
 from dcmp_hil.telemetry.makers import sorted_out
-from dcmp_hil.telemetry.rerun_sink import RerunSink
-from dcmp_hil.telemetry.rig_view import view_of
+from dcmp_hil.telemetry.rerun.rig_view import view_of
+from dcmp_hil.telemetry.rerun.sink import RerunSink
+from dcmp_hil.telemetry.rerun.viewer import free_port
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.telemetry.viewer import free_port
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 from tools.soak.source import Leak, Source, a_minute, events
@@ -92,7 +92,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
                 apart.event(event)
             if batch % _BATCHES_A_MINUTE == _BATCHES_A_MINUTE - 1:
                 _wait_until_quiet(apart, folder)
-                memory.look(batch // _BATCHES_A_MINUTE, pids, os.getpid())
+                memory.look((batch + 1) / _BATCHES_A_MINUTE, pids, os.getpid())
             elif batch % _TOTAL_EVERY == 0:
                 memory.look_at_total(pids)
         wall = time.monotonic() - began

@@ -51,11 +51,11 @@ class Growth:
 class Memory:
     """What several processes take, by simulated minute.
 
-    What counts as growth is what a process has for itself: its anonymous pages, in memory or swapped out, and
-    apart from them the files in memory that the control side shares with the others (ring, ledger, logs).
-    Pages of programs and libraries belong to the page cache, and the share of them that PSS charges to a
-    process falls and rises by 10 MB with what other processes of this computer run the same libraries. PSS is
-    what they take in all.
+    What counts as growth is what a process has for itself: its anonymous pages, in memory or swapped out. The
+    files in memory that the processes share (ring, ledger, logs) count once, apart from them. Pages of
+    programs and libraries do not count: they are the page cache's, and the share of them that PSS charges to
+    a process changes by 10 MB when an unrelated process with the same libraries starts or ends. What they
+    take in all is PSS.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ class Soaked:
     def faults(self) -> list[str]:
         """Return what must not be."""
         found = [
-            f"{name} grow by {growth.slope():.3f} MB a simulated minute"
+            f"{name}: grows by {growth.slope():.3f} MB a simulated minute"
             for name, growth in self.memory.growth.items()
             if not growth.slope() < SLOPE_MB
         ]

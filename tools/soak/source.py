@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.ipc.ring import Ring
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.ring import Ring
 
 
 class _Rows:
@@ -24,11 +24,11 @@ class _Rows:
         self.rows: list[NDArray[np.float64]] = []
 
     def block(self, block: Block) -> None:
-        """Keep them."""
+        """Keep a copy of the rows of the block."""
         self.rows.append(block.rows.copy())
 
     def event(self, event: Event) -> None:
-        """Forget it."""
+        """Ignore the event."""
 
     def close(self) -> None:
         """Nothing to finish."""
@@ -95,7 +95,7 @@ class Leak:
         self._kept.append(b"\1" * round(self._bytes_a_second * seconds))
 
     def event(self, event: Event) -> None:
-        """Forget it."""
+        """Ignore the event."""
 
     def close(self) -> None:
         """Nothing to finish."""
