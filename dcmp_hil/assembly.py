@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.values import Event
 
-_SETTLE, _ENGAGE = 0.25, 0.25  # s: ten time constants of the observer, then a ramp of authority
+_SETTLING_TIME_S = 0.25  # ten time constants of the observer
+_ENGAGING_TIME_S = 0.25  # then a ramp of authority
 
 
 def assemble(
@@ -167,8 +168,8 @@ def make_supervisor(
     return Supervisor(
         checks,
         clamps,
-        settle=0.0 if immediate else _SETTLE,
-        engage=0.0 if immediate else _ENGAGE,
+        settle=0.0 if immediate else _SETTLING_TIME_S,
+        engage=0.0 if immediate else _ENGAGING_TIME_S,
         notify=notify,
         probe=probe,
     )

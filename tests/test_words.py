@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +22,19 @@ _VAGUE = re.compile(
     re.IGNORECASE,
 )
 """Words and phrases without a named subject; in identifiers (`hand_on`) as well."""
+
+_VAGUE_CONSTANTS = frozenset(
+    re.findall(
+        r"\w+",
+        """
+        AGAIN ANSWER ANSWERS BUSY CLOSING COMING_UP ENOUGH FAR FARTHEST FASTEST FEW FEWEST HELD HERE
+        HIGHEST KEPT LARGE LARGEST LAST LATE LEAST LEAVING LONGEST LOOK LOOKS MANY MOST NEAR NEWEST NONE
+        NOTHING NOWHERE ODD OFF PATIENCE QUIET REST ROOM ROUND SHORTEST SHOWN SLOW SLOWEST SMALL SMALLEST
+        SOME SURE TAKEN TRIES WAITING
+        """,
+    )
+)
+"""Names of one word that say neither what they bound nor in which unit."""
 
 _CODE_RATE = 0.1  # vague words in 1,000 lines, at most
 _PAGES_RATE = 1.0
@@ -75,3 +89,27 @@ def test_vague_words_are_rare(files: Callable[[], Iterator[Path]], rate: float) 
 )
 def test_the_count_finds_vague_words(text: str, expected: list[str]) -> None:
     assert _vague_words(text) == expected
+
+
+def _constants(source: str) -> Iterator[str]:
+    """Yield the private constants of a module, without the underscore in front."""
+    for statement in ast.parse(source).body:
+        for node in ast.walk(statement) if isinstance(statement, ast.Assign | ast.AnnAssign) else ():
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id.startswith("_"):
+                yield node.id[1:]
+
+
+def test_no_constant_is_one_vague_word() -> None:
+    found = [
+        f"{path.relative_to(_ROOT)}: _{name}"
+        for room in ("dcmp_hil", "sim_backend")
+        for path in sorted((_ROOT / room).rglob("*.py"))
+        for name in _constants(path.read_text("utf-8"))
+        if name in _VAGUE_CONSTANTS
+    ]
+    assert found == []
+
+
+def test_the_constants_of_a_module_are_found() -> None:
+    source = "_LOOK = 0.1\n_FEW, _MOST = 1, 2\n_LATE: int = 3\ndef f() -> None:\n    _SLOW = 1\n"
+    assert list(_constants(source)) == ["LOOK", "FEW", "MOST", "LATE"]

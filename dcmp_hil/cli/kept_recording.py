@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
-_LOOKS, _BETWEEN = 50, 0.02  # s: the telemetry process may still be closing it
-_DATA, _PICTURE = 140.0, 170.0  # bytes a period, of run.mcap and of run.rrd
+_ATTEMPTS_MAX, _ATTEMPT_PERIOD_S = 50, 0.02  # s: the telemetry process may still be closing it
+_DATA_BYTES_PER_PERIOD, _PICTURE_BYTES_PER_PERIOD = 140.0, 170.0  # bytes a period, of run.mcap and of run.rrd
 _UNTIL_STOPPED = 600.0  # s that a run without a duration is taken for
 _MEGA = 1e-6
 
@@ -59,10 +59,10 @@ def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
         Whether a second may be waited for a file that is still being closed.
     """
     ending = ending_of(path)
-    looks = _LOOKS if wait else 0
+    looks = _ATTEMPTS_MAX if wait else 0
     while ending is None and looks and path.exists():
         looks -= 1
-        pause(_BETWEEN)
+        pause(_ATTEMPT_PERIOD_S)
         ending = ending_of(path)
     if ending is None:
         why = "its end is missing" if path.exists() else "it is gone"
@@ -95,11 +95,11 @@ def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture
         Whether run.rrd goes there as well.
     """
     seconds = length or _UNTIL_STOPPED
-    data = _DATA * rig.loop.rate_hz * seconds
-    needed = data + (_PICTURE * min(rig.loop.rate_hz, 2000.0) * seconds if picture else 0.0)
+    data = _DATA_BYTES_PER_PERIOD * rig.loop.rate_hz * seconds
+    needed = data + (_PICTURE_BYTES_PER_PERIOD * min(rig.loop.rate_hz, 2000.0) * seconds if picture else 0.0)
     if free >= needed:
         return ""
-    fits = free / (_DATA * rig.loop.rate_hz)
+    fits = free / (_DATA_BYTES_PER_PERIOD * rig.loop.rate_hz)
     what = f"{seconds:g} s" if length else "ten minutes of a run until Ctrl-C"
     return (
         f"{folder}: {_MEGA * free:.3g} MB are free, and {what} at {rig.loop.rate_hz:g} Hz need about "

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.wire.messages import Message
 
-_LOOK = 0.1  # s, how long a Ctrl-C waits at most
+_POLL_PERIOD_S = 0.1  # s, how long a Ctrl-C waits at most
 _BRIEF_NS = 100_000_000  # between two SAMPLEs, or two DRIVEs, that are shown
-_STREAMS = (SampleReport, Drive)
+_FREQUENT_MESSAGES = (SampleReport, Drive)
 
 
 class _Brief:
@@ -36,7 +36,7 @@ class _Brief:
     def lets_through(self, node: int, message: Message, now_ns: int) -> bool:
         """Return whether this message is to be shown."""
         kind = (node, type(message))
-        if isinstance(message, _STREAMS) and now_ns - self._shown.get(kind, -_BRIEF_NS) < _BRIEF_NS:
+        if isinstance(message, _FREQUENT_MESSAGES) and now_ns - self._shown.get(kind, -_BRIEF_NS) < _BRIEF_NS:
             return False
         self._shown[kind] = now_ns
         return True
@@ -73,7 +73,7 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
         until_ns = began_ns + 1e9 * duration if duration else math.inf
         with StopRequest() as stop:
             while not (stop.requested or output_failed()) and (now_ns := clock.now_ns()) < until_ns:
-                found = caller.overhear(_LOOK)
+                found = caller.overhear(_POLL_PERIOD_S)
                 if found is None:
                     continue
                 heard += 1

@@ -31,7 +31,7 @@ class _Shown(NamedTuple):
         return f"{_plain(self.scale * low, 5)}–{_plain(self.scale * high, 5)}"  # noqa: RUF001 - a range
 
 
-_SHOWN = {
+_COLUMNS_SHOWN = {
     "voltage_at_start_V": _Shown("voltage at t = 0", "V"),
     "tracking_max_rad": _Shown("tracking error, max", "µrad", 1e6),
     "tracking_rms_rad": _Shown("tracking error, RMS", "µrad", 1e6),
@@ -54,7 +54,7 @@ def reproduction_table(reproduction: Reproduction) -> Table:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("pass", no_wrap=True)
     for row in reproduction.rows:
-        shown = _SHOWN[row.quantity]
+        shown = _COLUMNS_SHOWN[row.quantity]
         table.add_row(
             shown.name,
             shown.unit,
@@ -94,7 +94,7 @@ def _misprint_cells(group: list[Misprint]) -> Iterator[Text]:
             _verdict(one.passed),
         )
         for one in group
-        for shown in (_SHOWN[one.quantity],)
+        for shown in (_COLUMNS_SHOWN[one.quantity],)
     )
     for cells in zip(*lines, strict=True):
         yield Text("\n").join(cells)

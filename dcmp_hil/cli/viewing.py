@@ -11,7 +11,7 @@ from dcmp_hil.platform.clock import pause
 from dcmp_hil.platform.display import display_problem
 from dcmp_hil.telemetry.rerun import viewer as window
 
-_PAUSE = 0.5  # s
+_POLL_PERIOD_S = 0.5  # s
 
 
 def attach(port: int | None, *, web: bool) -> None:
@@ -59,4 +59,4 @@ def find_served() -> int:
 
 def _until_it_ends(port: int) -> None:
     while window.speaks_http2(port):
-        pause(_PAUSE)
+        pause(_POLL_PERIOD_S)

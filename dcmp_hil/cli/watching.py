@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.sink import RerunSink, Viewer
     from dcmp_hil.values import Event
 
-_START = 60.0  # s, a far limit: that the pages are served is an event
+_START_TIMEOUT_S = 60.0  # s, a far limit: that the pages are served is an event
 
 
 def chosen(viewer: Viewer | None) -> Viewer:
@@ -98,7 +98,7 @@ def pages(port: int) -> Iterator[str]:
             except OSError as error:
                 problem = str(error)
                 break
-            if window.serves(web_port, process.pid, _START):
+            if window.serves(web_port, process.pid, _START_TIMEOUT_S):
                 address = window.web_url(web_port, port)
                 break
             process.kill()  # another process took the port first

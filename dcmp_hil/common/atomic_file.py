@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_SUFFIX = 16  # characters of a name's ending that are kept
+_SUFFIX_CHARS_MAX = 16  # characters of a name's ending that are kept
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def place_beside(path: Path) -> Path | None:
     place = real(path)
     if is_special(path) or not os.access(place.parent, os.W_OK | os.X_OK):
         return None
-    return place.with_name(f".{os.getpid()}{place.suffix[:_SUFFIX]}.part")
+    return place.with_name(f".{os.getpid()}{place.suffix[:_SUFFIX_CHARS_MAX]}.part")
 
 
 def real(path: Path) -> Path:

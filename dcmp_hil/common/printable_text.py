@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_SHOWN = {
+_VISIBLE_CHARACTERS = {
     **{code: 0x2400 + code for code in range(0x20) if code not in {0x09, 0x0A}},  # as control pictures
     0x7F: 0x2421,
     **dict.fromkeys(range(0x80, 0xA0), 0xFFFD),
@@ -38,4 +38,4 @@ def printable(text: str) -> str:
     text
         From anywhere; tabs and ends of lines stay.
     """
-    return readable(text.translate(_SHOWN))
+    return readable(text.translate(_VISIBLE_CHARACTERS))

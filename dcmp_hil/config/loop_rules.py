@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.rig import Rig
 
-_LEAST, _MOST = 0.8, 1.25  # times the believed motor gain, between which the loop must be stable
-_QUIET = 0.25  # of the voltage limit, that the encoder's count alone may cost (standard deviation)
-_SLOWEST = 4.0  # rad/s, of the observer's floor: below it an arm that is led to its limits overshoots them
-_GROWTH, _SWINGS = 0.1, 0.1  # 1/s; of the velocity limit
-_BLAMED = (
+_MOTOR_GAIN_RATIO_MIN = 0.8  # times the believed motor gain, for which the loop must be stable
+_MOTOR_GAIN_RATIO_MAX = 1.25  # the same, upper bound
+_NOISE_VOLTAGE_SHARE_MAX = 0.25
+"""Of the voltage limit, that the encoder's count alone may cost (standard deviation)."""
+_OBSERVER_BANDWIDTH_MIN_RAD_S = 4.0
+"""Rad/s, of the observer's floor: below it an arm that is led to its limits overshoots them."""
+_GROWTH_MIN_1_S, _SWING_SHARE_MAX = 0.1, 0.1  # 1/s; of the velocity limit
+_GAIN_KEYS = (
     ("loop", "rate_hz"),
     ("loop", "delay_samples"),
     ("amplifier", "voltage_limit_V"),
@@ -73,7 +76,7 @@ def _fault(rig: Rig) -> Callable[[], str] | None:
     if isinstance(rig.observer, SuperTwistingSettings) and (fault := _slow_fault(rig, rig.observer)):
         return partial(str, fault)
     for loop in loops(rig):
-        if not (loop.stable() and loop.stable(_LEAST) and loop.stable(_MOST)):
+        if not (loop.stable() and loop.stable(_MOTOR_GAIN_RATIO_MIN) and loop.stable(_MOTOR_GAIN_RATIO_MAX)):
             return partial(_unstable, loop)
         if math.isfinite(rig.amplifier.limit) and (fault := _rough(loop, rig.amplifier.limit)):
             return partial(_told, fault, loop)
@@ -83,10 +86,11 @@ def _fault(rig: Rig) -> Callable[[], str] | None:
 def _rough(loop: LinearLoop, limit: float) -> str:
     """Name what the encoder's steps alone cost, in V and V/s."""
     (noise, _), variation = loop.noise_V(), loop.variation_V_s()
-    if noise > _QUIET * limit:
+    if noise > _NOISE_VOLTAGE_SHARE_MAX * limit:
         return (
             f"with these gains the encoder's steps alone make the voltage shake by {noise:.2g} V "
-            f"(standard deviation); at most {_QUIET * limit:.3g} V, a quarter of amplifier.voltage_limit_V"
+            f"(standard deviation); at most {_NOISE_VOLTAGE_SHARE_MAX * limit:.3g} V, a quarter of "
+            "amplifier.voltage_limit_V"
         )
     if variation >= FLOOR_V_S:
         return (
@@ -100,13 +104,13 @@ def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
     """Name a differentiator that gravity leaves behind: neither its floor nor its slope follows the arm."""
     tuning = observer.tuning(ObserverContext(rig.model.values(), rig.period, rig.encoder.counts))
     fastest = rig.model.gravity_rad_s2 * rig.supervisor.velocity_limit_rad_s
-    if observer.mu0_rad_s is None or tuning.mu0 >= _SLOWEST or fastest <= tuning.M:
+    if observer.mu0_rad_s is None or tuning.mu0 >= _OBSERVER_BANDWIDTH_MIN_RAD_S or fastest <= tuning.M:
         return ""
     return (
-        f"a floor below {number(_SLOWEST)} rad/s does not follow what gravity does to an arm that moves "
-        "fast, and it passes its limits. Raise observer.mu0_rad_s, or leave it out; where the encoder is "
-        f"fine enough, observer.M_rad_s3 = {fastest:.4g}, gravity times supervisor.velocity_limit_rad_s, "
-        "does it too."
+        f"a floor below {number(_OBSERVER_BANDWIDTH_MIN_RAD_S)} rad/s does not follow what gravity does to "
+        "an arm that moves fast, and it passes its limits. Raise observer.mu0_rad_s, or leave it out; where "
+        f"the encoder is fine enough, observer.M_rad_s3 = {fastest:.4g}, gravity times "
+        "supervisor.velocity_limit_rad_s, does it too."
     )
 
 
@@ -114,14 +118,14 @@ def _euler_fault(rig: Rig, observer: PaperSettings) -> str:
     """Name what makes the paper's explicit Euler steps run away, or swing by more than the arm ever does."""
     step, count = rig.period, rig.encoder.count
     copy = np.array([[-observer.L1_1_s, 1.0], [-observer.L2_1_s2, -rig.model.f0_1_s]])
-    if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH * step:
+    if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH_MIN_1_S * step:
         return (
             f"explicit Euler steps of {1e3 * step:g} ms are not stable with these gains. Lower "
             "observer.L1_1_s and observer.L2_1_s2, or raise loop.rate_hz."
         )
     noise = max(observer.L1_1_s * count, step * observer.L2_1_s2 * count)
     noise += 2.0 * (observer.M_rad_s3 * count * count) ** (1 / 3)
-    if noise > _SWINGS * rig.supervisor.velocity_limit_rad_s:
+    if noise > _SWING_SHARE_MAX * rig.supervisor.velocity_limit_rad_s:
         return (
             f"one count of the encoder moves the estimated velocity by {noise:.3g} rad/s, a tenth of "
             "supervisor.velocity_limit_rad_s and more. Lower observer.L1_1_s, observer.L2_1_s2 or "
@@ -140,7 +144,8 @@ def _unstable(loop: LinearLoop) -> str:
     margins, reserve = loop.margins(), ""
     if (robust := loop.robustness()) is not None:
         reserve = f", with a margin of phase of {robust.phase_deg:.0f} degrees"
-    needed = f"{number(_LEAST)} to {number(_MOST)} times model.ku_rad_s2_V are needed"
+    gains = f"{number(_MOTOR_GAIN_RATIO_MIN)} to {number(_MOTOR_GAIN_RATIO_MAX)} times"
+    needed = f"{gains} model.ku_rad_s2_V are needed"
     remedy = "Leave out the gains that were changed to get those that fit, or raise loop.rate_hz."
     if margins is None:
         return f"the loop is not stable with these gains, for any gain of the motor: {needed}. {remedy}"
@@ -167,7 +172,7 @@ def _told(fault: str, loop: LinearLoop) -> str:
 
 def _blamed(rig: Rig) -> str:
     """Find the key that alone makes the difference; else name the proportional gain."""
-    for table, name in _BLAMED:
+    for table, name in _GAIN_KEYS:
         section = getattr(rig, table)
         if name not in section.model_fields_set:
             continue

@@ -12,7 +12,7 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_LONGEST = 60  # characters of an override that are shown
+_SHOWN_CHARS_MAX = 60  # characters of an override that are shown
 _OVERRIDES_MAX = 200
 _CHARACTERS_MAX = 8192  # of one override; a path has 4096 at most
 _DEPTH_MAX = 8  # parts of a dotted key; a rig's longest has 2, a class of the user's own may have tables
@@ -58,7 +58,7 @@ def _parsed(overrides: Sequence[str]) -> tuple[dict[tuple[str, ...], Any], list[
     pairs: dict[tuple[str, ...], Any] = {}
     for override in overrides:
         key, equals, text = override.partition("=")
-        shown = printable(override[:_LONGEST])[:_LONGEST]
+        shown = printable(override[:_SHOWN_CHARS_MAX])[:_SHOWN_CHARS_MAX]
         parts = tuple(part.strip() for part in key.split(".", _DEPTH_MAX))
         if len(override) > _CHARACTERS_MAX or len(parts) > _DEPTH_MAX:
             faults.append(

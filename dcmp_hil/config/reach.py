@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from dcmp_hil.config.rig import Rig
 
 _LOOK_AHEAD = 60.0  # s of a csv reference that are looked at where the run has no end
-_LOOKS = 2000
-_ROOM = 1.5  # of what pushes a healthy arm, that its watch needs
-_HELD = 0.95  # of the motor's torque, that holding the arm may take
+_REFERENCE_POINTS = 2000
+_WATCH_RATIO_MIN = 1.5  # of what pushes a healthy arm, that its watch needs
+_HOLDING_TORQUE_SHARE_MAX = 0.95  # of the motor's torque, that holding the arm may take
 
 
 class Peaks(NamedTuple):
@@ -49,7 +49,7 @@ def peaks(rig: Rig) -> Peaks:
         fastest = min(reference.velocity_rad_s, math.sqrt(abs(high - low) * hardest))
         return Peaks(max(abs(low), abs(high)), fastest, hardest)
     length = rig.run.duration_s or _LOOK_AHEAD
-    looks = [reference.at(length * k / _LOOKS) for k in range(_LOOKS + 1)]
+    looks = [reference.at(length * k / _REFERENCE_POINTS) for k in range(_REFERENCE_POINTS + 1)]
     return Peaks(*(max(map(abs, column)) for column in zip(*looks, strict=True)))
 
 
@@ -76,7 +76,7 @@ def _beyond(rig: Rig) -> Iterator[str]:
         )
     yield from _unexplained(rig, min(asked.position, position))
     motor, pushed = rig.model.ku_rad_s2_V * rig.amplifier.limit, _pushed(rig, min(asked.position, position))
-    if not pushed <= _HELD * motor:
+    if not pushed <= _HOLDING_TORQUE_SHARE_MAX * motor:
         yield (
             f"reference: the arm cannot be held there: gravity and the constant push are up to {pushed:.4g} "
             f"rad/s2, the motor has {motor:.4g} at amplifier.voltage_limit_V."
@@ -90,7 +90,7 @@ def _unexplained(rig: Rig, position: float) -> Iterator[str]:
         yield (
             f"reference: gravity, friction and the constant push are up to {seen:.4g} rad/s2 there, and the "
             f"watch ends the run at supervisor.disturbance_limit_rad_s2 = {limit:.4g}. Set that to "
-            f"{_ROOM * seen:.3g}, or stay nearer to hanging."
+            f"{_WATCH_RATIO_MIN * seen:.3g}, or stay nearer to hanging."
         )
 
 

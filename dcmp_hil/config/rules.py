@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 _COARSEST_ENCODER = 256  # counts a revolution
 _LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
 _FEWEST_COUNTS = 2  # from the encoder's middle to a limit of travel
-_HELD = 0.95  # of the motor's torque
-_LEAST = 1e-6  # of any key that must be above 0
-_REASON = {  # by unit: the largest plausible value
+_HOLDING_TORQUE_SHARE_MAX = 0.95  # of the motor's torque
+_POSITIVE_MIN = 1e-6  # of any key that must be above 0
+_PLAUSIBLE_MAX = {  # by unit: the largest plausible value
     "1_s": 1e5,
     "1_s2": 1e9,
     "rad_s3": 1e7,
@@ -178,7 +178,7 @@ def _motor_holds(rig: Rig) -> str:
     """Refuse a motor that what pushes all the time carries away."""
     model, motor = rig.model, rig.model.ku_rad_s2_V * rig.amplifier.limit
     pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
-    if rig.supervisor.monitors != "all" or pushed <= max(model.f1_rad_s2, _HELD * motor):
+    if rig.supervisor.monitors != "all" or pushed <= max(model.f1_rad_s2, _HOLDING_TORQUE_SHARE_MAX * motor):
         return ""
     return (
         f"model.eta_rad_s2: got {number(model.eta_rad_s2)}; with model.eta_amplitude_rad_s2 a push of up to "
@@ -213,19 +213,19 @@ def within_reason(section: type[Section], key: str) -> tuple[float, float]:
     """Return the smallest and the largest number that a key of a table may have, infinite without a unit."""
     described = section.model_json_schema()["properties"][key]
     bounds = {name: bound for one in (described, *described.get("anyOf", ())) for name, bound in one.items()}
-    largest = _REASON.get(split_unit(key)[1], math.inf)
+    largest = _PLAUSIBLE_MAX.get(split_unit(key)[1], math.inf)
     if bounds.get("exclusiveMinimum") == 0:
-        return _LEAST, largest
+        return _POSITIVE_MIN, largest
     return float(bounds.get("minimum", -largest)), largest
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:
     for key, field in type(section).model_fields.items():
         value, unit = getattr(section, key), split_unit(key)[1]
-        if not isinstance(value, float) or unit not in _REASON:
+        if not isinstance(value, float) or unit not in _PLAUSIBLE_MAX:
             continue
         above_zero = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
-        low, high = (_LEAST if above_zero else -_REASON[unit]), _REASON[unit]
+        low, high = (_POSITIVE_MIN if above_zero else -_PLAUSIBLE_MAX[unit]), _PLAUSIBLE_MAX[unit]
         if low <= value <= high:
             continue
         at_least, at_most = f"at least {number(low)}", f"at most {number(high)}"

@@ -12,8 +12,12 @@ from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 if TYPE_CHECKING:
     from dcmp_hil.config.rig import Rig
 
-_ROUGH = 10.0  # times the rule's, that the paper's Euler steps and an observer of one's own may cost
-_HORIZON, _WINDOW, _WINDOWS, _LOOKS = 60.0, 0.5, 120, 30  # s; s; of the reference, and instants in each
+_VARIATION_RATIO = 10.0
+"""Times the rule's, that the paper's Euler steps and an observer of one's own may cost."""
+_HORIZON_S = 60.0  # of the reference
+_WINDOW_S = 0.5  # of one window
+_WINDOWS = 120  # in the horizon
+_POINTS_PER_WINDOW = 30  # instants in each window
 
 
 def expected_variation(rig: Rig) -> float:
@@ -30,19 +34,19 @@ def expected_variation(rig: Rig) -> float:
         usual["observer"] = SuperTwistingSettings()
     found = [loop.variation_V_s() for loop in loops(rig.model_copy(update=usual))]
     noise = max((one for one in found if math.isfinite(one)), default=0.0)
-    return (_ROUGH if rough else 1.0) * noise + _of_reference(rig)
+    return (_VARIATION_RATIO if rough else 1.0) * noise + _of_reference(rig)
 
 
 def _of_reference(rig: Rig) -> float:
     """Return the largest mean of |dV/dt| in a window that following the reference takes, V/s."""
     most, step = 0.0, rig.period
     for window in range(_WINDOWS):
-        begin = window * _HORIZON / _WINDOWS
+        begin = window * _HORIZON_S / _WINDOWS
         changes = [
             abs(_voltage(rig, t + step) - _voltage(rig, t))
-            for t in (begin + k * _WINDOW / _LOOKS for k in range(_LOOKS))
+            for t in (begin + k * _WINDOW_S / _POINTS_PER_WINDOW for k in range(_POINTS_PER_WINDOW))
         ]
-        most = max(most, sum(changes) / (_LOOKS * step))
+        most = max(most, sum(changes) / (_POINTS_PER_WINDOW * step))
     return most if math.isfinite(most) else 0.0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-_LONGEST = 60  # characters of a key or a value that are shown
+_SHOWN_CHARS_MAX = 60  # characters of a key or a value that are shown
 _LARGEST_PLAIN = 1e15  # beyond it a float no longer holds every whole number
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 _TYPES = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}
@@ -80,7 +80,7 @@ def printable(text: str) -> str:
 
 
 def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    return text if len(text) <= _SHOWN_CHARS_MAX else text[: _SHOWN_CHARS_MAX - 3] + "..."
 
 
 def _quoted(text: str) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
-_CHUNK = 4096
+_READ_BYTES = 4096
 _BEL = 0x07
 _CR = 0x0D
 
@@ -96,7 +96,7 @@ class SerialPort:
             If the port failed.
         """
         try:
-            return self._serial.read(_CHUNK) if self._poll.poll(1e3 * timeout) else b""
+            return self._serial.read(_READ_BYTES) if self._poll.poll(1e3 * timeout) else b""
         except FAILURES as error:
             raise self._broken(error) from error
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 SILENCE_S = 2.0  # without a SAMPLE: the device is gone
 _AGE_US = 3000  # how old the SAMPLE may be that a DRIVE answers
-_FOLLOWS = 0.3  # of a period, each period: by how much the two clocks may differ
-_BURST = 512  # frames that are read without a look at the end
+_CLOCK_STEP_MAX_PERIODS = 0.3  # of a period, each period: by how much the two clocks may differ
+_BURST_FRAMES_MAX = 512  # frames that are read without a look at the end
 
 
 class StoppedError(Exception):
@@ -111,7 +111,7 @@ class Listener:
         if self._offset_us is None or offset_us < self._offset_us:
             self._offset_us = offset_us
         else:
-            self._offset_us = min(offset_us, self._offset_us + _FOLLOWS * self.period_us)
+            self._offset_us = min(offset_us, self._offset_us + _CLOCK_STEP_MAX_PERIODS * self.period_us)
         self.stalls += offset_us - self._offset_us > _AGE_US
 
     def listen(self, ticks: int = 1) -> list[Seen]:
@@ -144,7 +144,7 @@ class Listener:
 
     def drain(self) -> None:
         """Read every message that has arrived already."""
-        for _ in range(_BURST):
+        for _ in range(_BURST_FRAMES_MAX):
             before = len(self.heard)
             if self.take(0.0) is None and len(self.heard) == before:
                 return

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
 
 _LISTEN_S = 2.0  # a board that resets when its port is opened has booted by then
-_ENOUGH = 3  # SAMPLEs that are no accident
+_SAMPLES_MIN = 3  # SAMPLEs that are no accident
 
 
 def open_line(
@@ -72,7 +72,7 @@ def _listen(port: SerialPort, node: int, clock: Clock) -> str:
         came += len(data)
         for carrier, receiver in receivers.items():
             samples[carrier] += sum(_is_sample(frame, node) for frame in receiver.feed(data))
-            if samples[carrier] >= _ENOUGH:
+            if samples[carrier] >= _SAMPLES_MIN:
                 return carrier
     heard = f"{came} bytes came, but no SAMPLE of node {node}" if came else "nothing came"
     raise OpenError(

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.check import Check
     from dcmp_hil.conformance.client import Client
 
-_TRIES = 5  # of a check during which this host was late
-_LEAVINGS = 5  # DRIVEs that ask for IDLE before STOP does
+_ATTEMPTS_MAX = 5  # of a check during which this host was late
+_RELEASE_DRIVES = 5  # DRIVEs that ask for IDLE before STOP does
 _BRIEF_S = 0.02
-_LOOK = 40  # SAMPLEs at the start: whether they are of one device
-_LIVE = (State.ARMING, State.RUN)
+_IDENTIFICATION_SAMPLES = 40  # SAMPLEs at the start: whether they are of one device
+_ARMED_STATES = (State.ARMING, State.RUN)
 
 
 def run_checks(client: Client, checks: Sequence[Check], *, armed: bool, clear: bool) -> Iterator[Outcome]:
@@ -70,7 +70,7 @@ def _begin(client: Client, *, clear: bool) -> None:
     try:
         client.synchronise()
         watch = TickWatch()
-        for seen in client.listen(_LOOK):
+        for seen in client.listen(_IDENTIFICATION_SAMPLES):
             watch.add(seen.sample)
     except SampleTimeoutError as error:
         raise OpenError(str(error)) from error
@@ -94,13 +94,15 @@ def _begin(client: Client, *, clear: bool) -> None:
 def _run(client: Client, check: Check) -> Outcome:
     """Run a check; again, if this host was late and that may be the cause of what was found."""
     outcome, late = _try(client, check)
-    for _ in range(_TRIES - 1):
+    for _ in range(_ATTEMPTS_MAX - 1):
         if not late or _settle(client):
             return outcome
         outcome, late = _try(client, check)
     if not late:
         return outcome
-    why = f"in each of {_TRIES} tries this computer or its port was too late to answer; in the last one:"
+    why = (
+        f"in each of {_ATTEMPTS_MAX} tries this computer or its port was too late to answer; in the last one:"
+    )
     return Outcome(check, Verdict.NOT_JUDGED, (why, *outcome.findings))
 
 
@@ -159,12 +161,12 @@ def leave(client: Client) -> None:
     """Disarm and give the device back, as far as the line still goes; its watchdog does the rest."""
     client.leaving = True
     try:
-        for _ in range(_LEAVINGS):
+        for _ in range(_RELEASE_DRIVES):
             _hear_a_little(client)
             for session in client.sessions:
                 client.drive(session, release=True)
             _hear_a_little(client)
-            if not client.samples or client.state not in _LIVE:
+            if not client.samples or client.state not in _ARMED_STATES:
                 return
         client.stop()
     except BackendError:

@@ -29,12 +29,14 @@ if TYPE_CHECKING:
 
 _STATES = 11
 _P, _V, _APPLIED, _SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, _NOISE = range(_STATES)
-_GROWTH = 0.1  # 1/s: what grows more slowly than that is a drift
-_SLIDING = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
-_FARTHEST, _PER_DECADE, _HALVINGS = 1.0, 12, 12  # decades of gain that are searched, steps, refinements
-_DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
-_SLOWEST, _FREQUENCIES = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
-_UNMODELLED = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
+_GROWTH_MIN_1_S = 0.1  # 1/s: what grows more slowly than that is a drift
+_SLIDING_INNOVATION_COUNTS = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
+_GAIN_DECADES = 1.0  # that are searched
+_STEPS_PER_DECADE = 12
+_HALVINGS = 12  # refinements of the search
+_HISTORY_DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
+_FREQUENCY_MIN_RAD_S, _FREQUENCIES = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
+_UNMODELLED_RATIO = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
 
 
 class LoopSpec(NamedTuple):
@@ -113,7 +115,7 @@ class LinearLoop:
 
     def stable(self, motor: float = 1.0) -> bool:
         """Return whether nothing grows faster than a drift."""
-        return self.radius(motor) < math.exp(_GROWTH * self._spec.period)
+        return self.radius(motor) < math.exp(_GROWTH_MIN_1_S * self._spec.period)
 
     def margins(self) -> Margins | None:
         """Return the gains of the motor between which the loop is stable; None if it is not at 1."""
@@ -127,7 +129,7 @@ class LinearLoop:
         loop, drive = matrix[:_NOISE, :_NOISE], matrix[:_NOISE, _NOISE]
         with np.errstate(all="ignore"):
             power, spread = loop.copy(), np.outer(drive, drive)
-            for _ in range(_DOUBLINGS):
+            for _ in range(_HISTORY_DOUBLINGS):
                 spread = spread + power @ spread @ power.T
                 power = power @ power
         if not np.isfinite(spread).all():
@@ -142,7 +144,7 @@ class LinearLoop:
     def variation_V_s(self) -> float:
         """Return the mean of |dV/dt| that a count costs, V/s: the steps of the encoder as white noise."""
         _, change = self.noise_V()
-        return _UNMODELLED * math.sqrt(2.0 / math.pi) * change / self._spec.period
+        return _UNMODELLED_RATIO * math.sqrt(2.0 / math.pi) * change / self._spec.period
 
     def response(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return L(exp(j w T)) with the loop broken at the motor; shape (n,), of w in rad/s.
@@ -163,7 +165,7 @@ class LinearLoop:
         """Return margins of phase and delay and the peak of sensitivity; None where it is not stable."""
         if not self.stable():
             return None
-        w = np.geomspace(_SLOWEST, math.pi / self._spec.period * (1.0 - 1e-9), _FREQUENCIES)
+        w = np.geomspace(_FREQUENCY_MIN_RAD_S, math.pi / self._spec.period * (1.0 - 1e-9), _FREQUENCIES)
         loop = self.response(w)
         size = np.log(np.abs(loop))
         at = np.flatnonzero(np.diff(np.sign(size)) != 0.0)
@@ -182,8 +184,8 @@ class LinearLoop:
 
     def _edge(self, way: float) -> float:
         """Search for the end of stability upwards or downwards from 1."""
-        inside, step = 0.0, way * _FARTHEST / _PER_DECADE
-        for k in range(1, _PER_DECADE + 1):
+        inside, step = 0.0, way * _GAIN_DECADES / _STEPS_PER_DECADE
+        for k in range(1, _STEPS_PER_DECADE + 1):
             if not self.stable(10.0 ** (k * step)):
                 outside = k * step
                 break
@@ -232,5 +234,5 @@ class LinearLoop:
 
 def bandwidths(tuning: Tuning, count: float) -> Sequence[float]:
     """Return the bandwidths of the differentiator, rad/s: its floor, and the sliding term's at a count."""
-    sliding = (tuning.M / (_SLIDING * count)) ** (1 / 3) if count > 0.0 else 0.0
+    sliding = (tuning.M / (_SLIDING_INNOVATION_COUNTS * count)) ** (1 / 3) if count > 0.0 else 0.0
     return [mu for mu in (tuning.mu0, sliding) if mu >= max(tuning.mu0, 1e-9)]

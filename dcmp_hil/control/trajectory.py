@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from dcmp_hil.control.references import ReferenceSource
 
 LOWERING = 2.0  # s, from any position of the arm to hanging
-_CHANGING = 1.0  # s, from one reference into another, at least
-_FASTEST, _HARDEST = 2.0, 10.0  # rad/s and rad/s2 that a change of position adds at most
+_TRANSITION_TIME_MIN_S = 1.0  # s, from one reference into another, at least
+_TRANSITION_VELOCITY_MAX_RAD_S = 2.0  # that a change of position adds at most
+_TRANSITION_ACCELERATION_MAX_RAD_S2 = 10.0  # the same, of the acceleration
 
 
 class Trajectory:
@@ -116,7 +117,11 @@ def _faded_in(reference: Reference, x0: float, s: float, length: float) -> Refer
 def _time_to_bridge(gap: Reference) -> float:
     """Return the length of a quintic over a gap: its peaks are 1.875 d / T and 5.774 d / T^2."""
     distance = abs(gap.position)
-    return max(_CHANGING, 1.875 * distance / _FASTEST, math.sqrt(5.774 * distance / _HARDEST))
+    return max(
+        _TRANSITION_TIME_MIN_S,
+        1.875 * distance / _TRANSITION_VELOCITY_MAX_RAD_S,
+        math.sqrt(5.774 * distance / _TRANSITION_ACCELERATION_MAX_RAD_S2),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.quality import Concern, LinkCounters
 
-_SEQ = 0x1FFF
+_SEQUENCE_MASK = 0x1FFF
 _RUN = int(State.RUN)
 _HEALTHY = Fault.NONE  # found here faster than in its class
 _MOST_mV = 32_767.0  # what 16 bits hold
@@ -181,7 +181,15 @@ class DeviceBackend:
         asked_mV = voltage * self._terms.mV_per_V
         if not -_MOST_mV <= asked_mV <= _MOST_mV:
             asked_mV = math.copysign(_MOST_mV, asked_mV) if math.isfinite(asked_mV) else 0.0
-        fields = (round(asked_mV), self._tick & _SEQ, True, False, False, self._session, self._ttl_ms)
+        fields = (
+            round(asked_mV),
+            self._tick & _SEQUENCE_MASK,
+            True,
+            False,
+            False,
+            self._session,
+            self._ttl_ms,
+        )
         drive = make(Drive, fields)
         self._answered = self._tick
         self._link.send(pack(drive, self._node))

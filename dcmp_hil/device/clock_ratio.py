@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import deque
 from statistics import median, quantiles
 
-_WINDOW = 256  # ticks
-_QUIET = 2.5e-3  # of a slope: a spread that says nothing against the median
-_SPREAD = 1.1  # of the median: as much as a clock shows that goes wrong in the middle of what is looked at
-_FEWEST, _NEWEST = 4, 12  # slopes: fewer say nothing, and older ones nothing of the clock as it goes now
+_WINDOW_TICKS = 256  # ticks
+_NOISE_FREE_SPREAD = 2.5e-3  # of a slope: a spread that says nothing against the median
+_SPREAD_RATIO_MAX = 1.1
+"""Of the median: as much as a clock shows that goes wrong in the middle of what is looked at."""
+_SLOPES_MIN = 4  # fewer say nothing
+_SLOPES_MAX = 12  # older ones say nothing of the clock as it goes now
 
 
 class ClockRatio:
@@ -31,7 +33,7 @@ class ClockRatio:
         self._earliest = 0.0  # ns, arrival after the nominal instant: the smallest of this window
         self._tick = 0  # at which it was
         self._before: tuple[int, float] | None = None  # the same of the window before
-        self._slopes: deque[float] = deque(maxlen=_NEWEST)
+        self._slopes: deque[float] = deque(maxlen=_SLOPES_MAX)
 
     def add(self, tick: int, heard_ns: int) -> None:
         """Take a sample's tick, and the instant of its arrival."""
@@ -45,11 +47,11 @@ class ClockRatio:
     @property
     def error(self) -> float | None:
         """How much the device's clock is fast, as a share: -0.02 is 2 % slow; None if not known."""
-        if len(self._slopes) < _FEWEST:
+        if len(self._slopes) < _SLOPES_MIN:
             return None
         longer = median(self._slopes)  # a nominal period takes so much longer than it should
         first, _, third = quantiles(self._slopes, n=4)
-        if third - first > max(_SPREAD * abs(longer), _QUIET):
+        if third - first > max(_SPREAD_RATIO_MAX * abs(longer), _NOISE_FREE_SPREAD):
             return None  # this computer stood still too often to tell
         return 1.0 / (1.0 + longer) - 1.0
 
@@ -60,4 +62,4 @@ class ClockRatio:
                 if apart > 0:
                     self._slopes.append((self._earliest - self._before[1]) / (apart * self._period_ns))
             self._before = self._tick, self._earliest
-        self._ends = tick + _WINDOW
+        self._ends = tick + _WINDOW_TICKS

@@ -12,23 +12,23 @@ if TYPE_CHECKING:
 
     from dcmp_hil.device.device_config import Terms
 
-_INT = 2**31 - 1
+_INT32_MAX = 2**31 - 1
 RANGES = {
-    Parameter.BOARD: (0, _INT),
-    Parameter.BOOT_COUNT: (0, _INT),
-    Parameter.RESET_CAUSE: (0, _INT),
-    Parameter.TICK: (0, _INT),
+    Parameter.BOARD: (0, _INT32_MAX),
+    Parameter.BOOT_COUNT: (0, _INT32_MAX),
+    Parameter.RESET_CAUSE: (0, _INT32_MAX),
+    Parameter.TICK: (0, _INT32_MAX),
     Parameter.COUNTS_PER_REV: (1, 2**24),
     Parameter.PERIOD_US: (50, 100_000),
     Parameter.VOLTAGE_LIMIT_MV: (1, 32_767),
-    Parameter.SLEW_MV_PER_MS: (0, _INT),
+    Parameter.SLEW_MV_PER_MS: (0, _INT32_MAX),
     Parameter.WATCHDOG_MS: (5, 50),
-    Parameter.SPEED_LIMIT_COUNTS_S: (1, _INT),
-    Parameter.TRAVEL_LIMIT_COUNTS: (1, _INT),
+    Parameter.SPEED_LIMIT_COUNTS_S: (1, _INT32_MAX),
+    Parameter.TRAVEL_LIMIT_COUNTS: (1, _INT32_MAX),
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
-    Parameter.LAST_FAULT_DETAIL: (-_INT - 1, _INT),
-    Parameter.SUPPLY_MV: (0, _INT),
+    Parameter.LAST_FAULT_DETAIL: (-_INT32_MAX - 1, _INT32_MAX),
+    Parameter.SUPPLY_MV: (0, _INT32_MAX),
     Parameter.TRAVEL_ORIGIN_COUNTS: (-1, 2**24 - 1),
 }
 """What a value can be at all, both ends included."""

@@ -13,8 +13,8 @@ from dcmp_hil.safety.speed_resolution import resolution
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
-_UNLIMITED = 32_767  # mV: what the wire can say
-_MOST = 2**31 - 1
+_VOLTAGE_MAX_MV = 32_767  # mV: what the wire can say
+_PARAMETER_MAX = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class Terms:
             node=device.node,
             counts_per_rev=round(counts),
             period_us=round(1e6 * rig.period),
-            voltage_limit_mV=round(min(1e3 * rig.amplifier.limit, _UNLIMITED)),
+            voltage_limit_mV=round(min(1e3 * rig.amplifier.limit, _VOLTAGE_MAX_MV)),
             slew_mV_per_ms=None if math.isinf(slew) else max(1, round(slew)),
             watchdog_ms=device.watchdog_ms,
             rad_per_count=rig.encoder.sign * math.tau / counts,
@@ -112,4 +112,4 @@ class Terms:
 
 def _counts(limit: float, counts_per_rev: float) -> int:
     """Return a limit in radians in whole counts, never above it unless it is below one."""
-    return max(1, min(math.floor(limit * counts_per_rev / math.tau), _MOST))
+    return max(1, min(math.floor(limit * counts_per_rev / math.tau), _PARAMETER_MAX))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.messages import SampleReport
 
-_LEAST = 3  # answers at 0 V
+_ZERO_ANSWERS_MIN = 3  # answers at 0 V
 _PATIENCE_NS = 250_000_000
 _HEALTH_NS = 120_000_000  # HEALTH comes every 100 ms
 _OF_THE_LINK = (Fault.HOST_SILENT, Fault.LINK_DOWN, Fault.CORRUPT_LINK)
@@ -64,7 +64,7 @@ class Goodbye:
             if sample is None:
                 return None
             confirmed = sample.state in _AT_REST and sample.voltage_mV == 0
-            if confirmed and said >= _LEAST:
+            if confirmed and said >= _ZERO_ANSWERS_MIN:
                 self._say(release=True)
                 self._hear_health(sample)
                 return DeviceEnd(State(sample.state).name, self._fault_of(sample))

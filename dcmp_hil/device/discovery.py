@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
 
 LISTEN = 0.25  # s; a device sends every period, from boot on
-_TWINS = 1.0  # s, longer where ticks are odd
-_TICKS = 256
-_OTHER = 7  # fault class of every code from 7 on
+_TWO_DEVICES_LISTEN_S = 1.0  # s, longer where ticks are odd
+_TICK_MODULUS = 256
+_OTHER_FAULT_CLASS = 7  # fault class of every code from 7 on
 _ASKS_ONLY = 0  # the session of a HELLO that owns nothing
 _DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
-_KEYS = ("kind", "port", "interface", "channel")  # that a command names always
-_UNUSUAL = ("node", "baud", "bitrate")  # that it names where they are not the default
+_KEYS_ALWAYS_SHOWN = ("kind", "port", "interface", "channel")  # that a command names always
+_KEYS_WITH_DEFAULT = ("node", "baud", "bitrate")  # that it names where they are not the default
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +166,8 @@ def _keys(settings: Serial | Can, node: int) -> tuple[str, ...]:
     """Return the keys of `[backend]` that reach a node."""
     values = {**settings.model_dump(), "node": node}
     usual = type(settings).model_fields
-    named = [key for key in _KEYS if key in values]
-    named += [key for key in _UNUSUAL if key in values and values[key] != usual[key].default]
+    named = [key for key in _KEYS_ALWAYS_SHOWN if key in values]
+    named += [key for key in _KEYS_WITH_DEFAULT if key in values and values[key] != usual[key].default]
     return tuple(f"{key}={values[key]}" for key in named)
 
 
@@ -198,7 +198,7 @@ def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
     ticks: dict[int, int] = {}
     nodes: set[int] = set()
     watches: dict[int, TickWatch] = {}
-    longest_ns = deadline_ns + int(1e9 * _TWINS)
+    longest_ns = deadline_ns + int(1e9 * _TWO_DEVICES_LISTEN_S)
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
         heard = caller.overhear(1e-9 * left_ns)
         if heard is None:
@@ -206,7 +206,7 @@ def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
         node, sample = heard
         if not isinstance(sample, SampleReport):
             continue
-        if ticks.get(node) == (sample.tick - 1) % _TICKS:
+        if ticks.get(node) == (sample.tick - 1) % _TICK_MODULUS:
             if not nodes:  # from the first on no longer than usual
                 deadline_ns = clock.now_ns() + int(1e9 * LISTEN)
             nodes.add(node)
@@ -243,4 +243,6 @@ def state_in_words(sample: SampleReport) -> str:
     state = State(sample.state).name if sample.state in set(State) else f"state {sample.state}"
     if sample.state != State.FAULT:
         return state
-    return f"{state} ({name_of(sample.fault_class) if sample.fault_class < _OTHER else 'see FAULT'})"
+    return (
+        f"{state} ({name_of(sample.fault_class) if sample.fault_class < _OTHER_FAULT_CLASS else 'see FAULT'})"
+    )

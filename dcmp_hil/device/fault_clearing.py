@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from dcmp_hil.device.client import Caller
     from dcmp_hil.platform.clock import Clock
 
-_REPORT = 0.25  # s: FAULT comes every 100 ms
-_OTHER = 7  # fault class of every code from 7 on
-_SEQ = 0x1FFF
+_FAULT_REPORT_TIMEOUT_S = 0.25  # s: FAULT comes every 100 ms
+_OTHER_FAULT_CLASS = 7  # fault class of every code from 7 on
+_SEQUENCE_MASK = 0x1FFF
 _OF_A_RUN = (
     *(Fault.HOST_SILENT, Fault.LINK_DOWN, Fault.CORRUPT_LINK),
     *(Fault.OVER_SPEED, Fault.OVER_TRAVEL, Fault.ENCODER_JUMP),
@@ -76,7 +76,7 @@ class Clearing:
             if sample.state != State.FAULT:
                 return name_of(code)
             self._check_same(code)
-            seq = self._caller.tick & _SEQ
+            seq = self._caller.tick & _SEQUENCE_MASK
             self._caller.say(Drive(0, seq, False, clear, False, self._session, self._ttl_ms))
             clear = not clear
         raise open_errors.faulty(self._name, name_of(code))
@@ -87,12 +87,12 @@ class Clearing:
         if caller.sample is None or caller.sample.state != State.FAULT:
             return 0
         caller.fault = 0  # of before
-        deadline_ns = self._clock.now_ns() + int(1e9 * _REPORT)
+        deadline_ns = self._clock.now_ns() + int(1e9 * _FAULT_REPORT_TIMEOUT_S)
         while not caller.fault and (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             caller.hear(1e-9 * left_ns)
         if caller.sample.state != State.FAULT:
             return 0
-        known = caller.sample.fault_class if caller.sample.fault_class < _OTHER else Fault.UNKNOWN
+        known = caller.sample.fault_class if caller.sample.fault_class < _OTHER_FAULT_CLASS else Fault.UNKNOWN
         return caller.fault or known
 
     def _waits_for_person(self, code: int) -> bool:
@@ -107,5 +107,5 @@ class Clearing:
         seen = sample.fault_class if sample is not None else 0
         if told not in {0, code}:
             raise open_errors.other_fault(self._name, name_of(code), name_of(told))
-        if code != Fault.UNKNOWN and seen != min(code, _OTHER):
+        if code != Fault.UNKNOWN and seen != min(code, _OTHER_FAULT_CLASS):
             raise open_errors.other_fault(self._name, name_of(code), name_of(seen))

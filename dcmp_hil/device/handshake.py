@@ -39,10 +39,12 @@ if TYPE_CHECKING:
     from dcmp_hil.errors import OpenError
     from dcmp_hil.platform.clock import Clock
 
-_HELLOS, _TOLD = 5, 2
+_HELLO_ATTEMPTS, _OWNED_ANSWERS_MIN = 5, 2
 _ROUND_TRIPS = 5
-_SLOWEST = 3e-3  # s: a command older than that is refused by the device
-_JOINS, _EARLY, _LATE = 3, -4, 32  # ticks that a SAMPLE may differ from what TICK said before it
+_COMMAND_AGE_MAX_S = 3e-3  # s: a command older than that is refused by the device
+_TICK_JOIN_ATTEMPTS = 3  # attempts to match a SAMPLE with an answer to TICK
+_TICK_DIFFERENCE_MIN = -4  # ticks that a SAMPLE may differ from TICK
+_TICK_DIFFERENCE_MAX = 32  # the same, upper bound
 _HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
 _TWINS_S = 0.1
 _MANY_DAMAGED = 5  # frames, in a second
@@ -171,7 +173,7 @@ class Handshake:
     def _introduce(self) -> str:
         """Become the owner, confirmed by two answers: on a bus an IDENTITY may answer another host."""
         told, identity = 0, None
-        for _ in range(_HELLOS):
+        for _ in range(_HELLO_ATTEMPTS):
             identity = self._ask_who()
             firmware = f"{identity.firmware_version >> 8}.{identity.firmware_version & 0xFF}"
             self._check_identity(identity, firmware)
@@ -180,7 +182,7 @@ class Handshake:
             else:
                 told = 0
                 self._caller.listen(1e-3 * (5 + secrets.randbelow(20)))
-            if told == _TOLD:
+            if told == _OWNED_ANSWERS_MIN:
                 return firmware
         self._check_alone()
         if identity is not None and identity.mismatch:
@@ -220,7 +222,7 @@ class Handshake:
         for _ in range(_ROUND_TRIPS):
             trip = self._caller.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
             best, waited = min(best, trip or math.inf), waited or trip is None
-            if best <= _SLOWEST + 1e-6 * self._terms.period_us:
+            if best <= _COMMAND_AGE_MAX_S + 1e-6 * self._terms.period_us:
                 break
         else:
             raise open_errors.slow(self._link.name, best)
@@ -231,7 +233,7 @@ class Handshake:
         """Look for a second device of the same node; longer where the ticks are odd."""
         ticks = self._caller.ticks
         if ticks.suspicious:
-            self._caller.listen(max(_TWINS_S, _LATE * 1e-6 * self._terms.period_us))
+            self._caller.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._terms.period_us))
         if ticks.two_devices:
             raise open_errors.two_devices(self._link.name, self._terms.node)
 
@@ -276,11 +278,11 @@ class Handshake:
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
         told = 0
-        for _ in range(_JOINS):
+        for _ in range(_TICK_JOIN_ATTEMPTS):
             told = self._parameters.get(Parameter.TICK)
             if self._caller.hear_sample(PATIENCE) is None:
                 continue
-            if _EARLY <= self._caller.tick - told <= _LATE:
+            if _TICK_DIFFERENCE_MIN <= self._caller.tick - told <= _TICK_DIFFERENCE_MAX:
                 return
         raise open_errors.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link
     from dcmp_hil.wire.messages import Health, SampleReport
 
-_LATE = 0.5  # of a period
+_LATE_MIN_PERIODS = 0.5  # of a period
 
 
 class LinkMeter:
@@ -36,7 +36,7 @@ class LinkMeter:
     def __init__(self, link: Link, period_ns: float) -> None:
         self.counts = LinkCounters()
         self.health: Health | None = None
-        self._link, self._period_ns, self._late_ns = link, period_ns, _LATE * period_ns
+        self._link, self._period_ns, self._late_ns = link, period_ns, _LATE_MIN_PERIODS * period_ns
         self._first_health: Health | None = None
         self._damaged_before = 0
         self._clock = ClockRatio(period_ns)

@@ -10,9 +10,9 @@ from dcmp_hil.wire.counters import nearest
 if TYPE_CHECKING:
     from dcmp_hil.wire.messages import SampleReport
 
-_KEPT = 32
-_FEWEST = 24
-_SHARE = 0.25  # of the kept: one reset, frames that come twice or late make fewer
+_KEPT_TICKS = 32
+_TICKS_MIN = 24
+_ODD_TICKS_SHARE_MIN = 0.25  # of the kept: one reset, frames that come twice or late make fewer
 
 
 class TickWatch:
@@ -23,7 +23,7 @@ class TickWatch:
 
     def __init__(self) -> None:
         self._last: SampleReport | None = None
-        self._odd: deque[bool] = deque(maxlen=_KEPT)
+        self._odd: deque[bool] = deque(maxlen=_KEPT_TICKS)
 
     def add(self, sample: SampleReport) -> None:
         """Take the next SAMPLE of the node."""
@@ -40,4 +40,4 @@ class TickWatch:
     @property
     def two_devices(self) -> bool:
         """Whether the ticks show two devices with the same node number."""
-        return len(self._odd) >= _FEWEST and sum(self._odd) >= _SHARE * len(self._odd)
+        return len(self._odd) >= _TICKS_MIN and sum(self._odd) >= _ODD_TICKS_SHARE_MIN * len(self._odd)

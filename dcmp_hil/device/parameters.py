@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.device.client import Caller
     from dcmp_hil.device.device_config import Terms
 
-_LOOKS = 3  # at a count before it is taken for the arm's
+_COUNT_READINGS = 3  # at a count before it is taken for the arm's
 _COUNTS = 2**24  # of a SAMPLE
 
 
@@ -104,12 +104,12 @@ class Parameters:
     def _hanging(self) -> int:
         """Return the count of an arm that hangs now: the middle one of three, so that a wrong one is none."""
         counts: list[int] = []
-        while len(counts) < _LOOKS:
+        while len(counts) < _COUNT_READINGS:
             sample = self._caller.hear_sample(PATIENCE)
             if sample is None:
                 raise open_errors.no_samples(self._name, PATIENCE, "nothing")
             counts.append(nearest(counts[0] if counts else 0, sample.position_counts, 24))
-        return sorted(counts)[_LOOKS // 2] % _COUNTS
+        return sorted(counts)[_COUNT_READINGS // 2] % _COUNTS
 
     def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
         return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)

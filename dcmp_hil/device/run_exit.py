@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
 
 _OTHER_FAULT = 7  # fault_class that only says: see FAULT
-_PERIODS, _NEAR = 3, 8  # how long is listened; ticks that follow the newest one
+_LISTENING_PERIODS, _TICK_DISTANCE_MAX = 3, 8  # how long is listened; ticks that follow the newest one
 
 
 def why_left(report: SampleReport, told: int) -> int:
@@ -44,8 +44,8 @@ def another_runs(link: Link, clock: Clock, node: int, ticks: tuple[int, int], pe
     """
     last, strange = ticks
     step = nearest(0, strange - last, 8)
-    first = step if 1 <= step <= _NEAR else 1  # that of one device comes after all of its own
-    until_ns = clock.now_ns() + int(1e9 * _PERIODS * period)
+    first = step if 1 <= step <= _TICK_DISTANCE_MAX else 1  # that of one device comes after all of its own
+    until_ns = clock.now_ns() + int(1e9 * _LISTENING_PERIODS * period)
     while (left_ns := until_ns - clock.now_ns()) > 0:
         frame = link.receive(1e-9 * left_ns)
         try:
@@ -53,5 +53,5 @@ def another_runs(link: Link, clock: Clock, node: int, ticks: tuple[int, int], pe
         except CorruptFrameError:
             continue
         if isinstance(message, SampleReport) and message.state == State.RUN:
-            return first <= nearest(0, message.tick - last, 8) <= _NEAR + _PERIODS
+            return first <= nearest(0, message.tick - last, 8) <= _TICK_DISTANCE_MAX + _LISTENING_PERIODS
     return False

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MESSAGE = 1 << 16
 """Bytes of the longest."""
-_WORKING = 60.0  # s that a process has which works at its answer
+_WORK_TIMEOUT_S = 60.0  # s that a process has which works at its answer
 
 
 def receive(channel: socket.socket, within: float) -> bytes:
@@ -32,7 +32,7 @@ def receive(channel: socket.socket, within: float) -> bytes:
 def receive_from_working(process: subprocess.Popen[bytes], channel: socket.socket, idle: float) -> bytes:
     """Return the next message; nothing once the process has done nothing for `idle` (s), or has ended."""
     clock = MonotonicClock()
-    end_ns = clock.now_ns() + int(_WORKING * 1e9)
+    end_ns = clock.now_ns() + int(_WORK_TIMEOUT_S * 1e9)
     used = _cpu_time(process.pid)
     while not (answer := receive(channel, idle)) and clock.now_ns() < end_ns:
         before, used = used, _cpu_time(process.pid)

@@ -16,12 +16,23 @@ if TYPE_CHECKING:
 
     from dcmp_hil.control.change import Change
 
-_WORDS = 16  # of 8 bytes
-_ASKED, _TAKEN, _ANSWER, _PHASE, _LENGTH, _CHECK, _LAST, _BELL, _STOP, _STOP_TAKEN, _HANDLERS, _END = range(
-    12
-)
+_HEADER_WORDS = 16  # of 8 bytes
+(
+    _ASKED,
+    _TAKEN_NUMBER,
+    _ANSWER_CODE,
+    _PHASE,
+    _LENGTH,
+    _CHECK,
+    _END_TEXT_LENGTH,
+    _BELL,
+    _STOP,
+    _STOP_TAKEN,
+    _HANDLERS,
+    _END,
+) = range(12)
 _TIME = struct.Struct("d")
-_TIME_AT, _LAST_AT, _SLOT_AT = 8 * _WORDS, 256, 4096
+_TIME_AT, _END_TEXT_AT, _SLOT_AT = 8 * _HEADER_WORDS, 256, 4096
 BELL = _BELL
 """Place of the number that tells the loop to look at the others."""
 SIZE = 1 << 16
@@ -60,7 +71,7 @@ class Mailbox:
 
     def __init__(self, memory: mmap.mmap | bytearray | None = None) -> None:
         self.memory = bytearray(SIZE) if memory is None else memory
-        self.words = memoryview(self.memory)[: 8 * _WORDS].cast("q")
+        self.words = memoryview(self.memory)[: 8 * _HEADER_WORDS].cast("q")
 
     # ---------------------------------------------------------------- the side that asks
 
@@ -121,9 +132,9 @@ class Mailbox:
 
     def answer(self, number: int) -> Answer | None:
         """Return what became of the change of that number; None as long as the loop has not taken it."""
-        if self.words[_TAKEN] != number:
+        if self.words[_TAKEN_NUMBER] != number:
             return None
-        return Answer(self.words[_ANSWER], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))
+        return Answer(self.words[_ANSWER_CODE], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))
 
     def withdraw(self) -> None:
         """Remove a change that the loop has not taken yet."""
@@ -137,7 +148,9 @@ class Mailbox:
     @property
     def last_words(self) -> str:
         """How the run ended; empty while it has not."""
-        return bytes(self.memory[_LAST_AT : _LAST_AT + self.words[_LAST]]).decode("utf-8", "replace")
+        return bytes(self.memory[_END_TEXT_AT : _END_TEXT_AT + self.words[_END_TEXT_LENGTH]]).decode(
+            "utf-8", "replace"
+        )
 
     # ---------------------------------------------------------------- the loop's side
 
@@ -151,9 +164,9 @@ class Mailbox:
 
     def reply(self, number: int, answer: Answer) -> None:
         """Store the answer to the change with this number."""
-        self.words[_ANSWER] = answer.what
+        self.words[_ANSWER_CODE] = answer.what
         _TIME.pack_into(self.memory, _TIME_AT, answer.t)
-        self.words[_TAKEN] = number
+        self.words[_TAKEN_NUMBER] = number
 
     @property
     def asked(self) -> int:
@@ -177,7 +190,7 @@ class Mailbox:
 
     def tell_end(self, sentence: str, end: int = UNCONFIRMED) -> None:
         """Say how the run ended: in words, and as a number such as `AT_ZERO`."""
-        data = readable(sentence).encode()[: _SLOT_AT - _LAST_AT]
-        self.memory[_LAST_AT : _LAST_AT + len(data)] = data
-        self.words[_LAST] = len(data)
+        data = readable(sentence).encode()[: _SLOT_AT - _END_TEXT_AT]
+        self.memory[_END_TEXT_AT : _END_TEXT_AT + len(data)] = data
+        self.words[_END_TEXT_LENGTH] = len(data)
         self.words[WORD] = end

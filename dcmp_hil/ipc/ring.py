@@ -31,18 +31,18 @@ FIELDS = (
 
 NOWHERE = Reference(math.nan, math.nan, math.nan)
 _NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
-_HEAD, _SIZE = 64, _NUMBERED.size
+_HEADER_BYTES, _ROW_BYTES = 64, _NUMBERED.size
 _pack = _NUMBERED.pack_into
 
 
 def size_of(capacity: int) -> int:
     """Return the bytes that a ring of so many rows takes."""
-    return _HEAD + capacity * _SIZE
+    return _HEADER_BYTES + capacity * _ROW_BYTES
 
 
 def capacity_of(size: int) -> int:
     """Return how many rows a ring of so many bytes holds."""
-    return (size - _HEAD) // _SIZE
+    return (size - _HEADER_BYTES) // _ROW_BYTES
 
 
 class Ring:
@@ -63,7 +63,7 @@ class Ring:
         self.memory = bytearray(size_of(capacity)) if memory is None else memory
         self.dropped = 0  # rows overwritten before they were read here
         self.position = 0  # the next row to read
-        self._rows = np.frombuffer(self.memory, np.float64, offset=_HEAD).reshape(capacity, -1)
+        self._rows = np.frombuffer(self.memory, np.float64, offset=_HEADER_BYTES).reshape(capacity, -1)
         self._written = 0
         # One store of the CPU; `pack_into` would clear the place first, and a reader might find 0 there.
         self._count = memoryview(self.memory)[:8].cast("q")
@@ -72,7 +72,7 @@ class Ring:
         """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
         sample, estimate, reference, demand, voltage, timing = cycle
         k = self._written
-        row = _HEAD + k % self.capacity * _SIZE
+        row = _HEADER_BYTES + k % self.capacity * _ROW_BYTES
         _pack(
             self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth, *now, began
         )  # fmt: skip

@@ -11,7 +11,7 @@ import zlib
 from typing import Any
 
 _HEADER = struct.Struct("QQQ")  # number, length, check sum
-_SLOT = 1 << 18  # bytes; only those written take memory
+_SLOT_BYTES = 1 << 18  # bytes; only those written take memory
 
 
 def reserve(owner: object, what: str) -> int:
@@ -53,16 +53,16 @@ class Ledger:
             If there is no memory left.
         """
         data = pickle.dumps(value)
-        if len(data) > _SLOT - _HEADER.size:
+        if len(data) > _SLOT_BYTES - _HEADER.size:
             raise OSError("too large for the ledger")
         self._number += 1
-        place = self._number % 2 * _SLOT
+        place = self._number % 2 * _SLOT_BYTES
         header = _HEADER.pack(self._number, len(data), zlib.crc32(data))
         _write(self._file, header + data, place)
 
     def read(self) -> Any:
         """Return the last one written whole; None if there is none."""
-        found = [self._slot(0), self._slot(_SLOT)]
+        found = [self._slot(0), self._slot(_SLOT_BYTES)]
         number, data = max(found, key=lambda slot: slot[0])
         return pickle.loads(data) if number else None  # noqa: S301 - written by our own child
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 RAMP = 0.25  # s, over which gains go from old to new
 _PLACES = {phase.value: place for place, phase in enumerate(Phase)}
-_KEPT = 1000  # changes that the summary lists
-_AWAKE = -1  # no number of the bell: there is something to do every period
+_LISTED_CHANGES_MAX = 1000  # changes that the summary lists
+_EVERY_CYCLE = -1  # no number of the bell: there is something to do every period
 _OTHER_HANDLERS = (
     "Something in this process sets or blocks signals that end a run ({names}); they end it as before. Take "
     "the calls of signal.signal and pthread_sigmask out of the class of your own, or have the library leave "
@@ -114,7 +114,7 @@ class LiveChanges:
     def warn(self, sentence: str) -> None:
         """Have the loop tell of something; called from another thread."""
         self._news.append(sentence)
-        self._seen = _AWAKE
+        self._seen = _EVERY_CYCLE
 
     def _look(self, t: float) -> None:
         bell = self._words[BELL]  # before the rest: what comes meanwhile rings again
@@ -129,7 +129,7 @@ class LiveChanges:
             self._take(number, t)
         if self._ramp is not None and self._ramp.over(t):
             self._ramp = None
-        self._seen = bell if self._ramp is None else _AWAKE
+        self._seen = bell if self._ramp is None else _EVERY_CYCLE
         while self._news:
             self._notify(Event(t, "WARN", EventKind.CONTROL, self._news.popleft()))
 
@@ -156,7 +156,7 @@ class LiveChanges:
         if what == APPLIED:
             sentence = f"{change.words}, applied at t = {t:.3f} s"
             self._notify(Event(t, "INFO", EventKind.CHANGE, sentence, ChangeData(change.values)))
-            if len(self.made) < _KEPT:
+            if len(self.made) < _LISTED_CHANGES_MAX:
                 self.made.append(sentence)
 
     def _make(self, change: Change, t: float) -> int:

@@ -14,9 +14,11 @@ from dcmp_hil.live.stopping import LIMIT, End, Stopped, is_alive, stop_run
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_SLOW = 3.0  # s: a change has a second to be applied in
-_TAKEN = 0.15  # s for a control process to say that it has understood STOP
-_NONE = "No run listens here. Start one with `dcmp-hil run`; --no-control and --fast keep it from listening."
+_ANSWER_TIMEOUT_S = 3.0  # s: a change has a second to be applied in
+_STOP_RECEIPT_TIMEOUT_S = 0.15  # s for a control process to say that it has understood STOP
+_NO_RUN_ERROR = (
+    "No run listens here. Start one with `dcmp-hil run`; --no-control and --fast keep it from listening."
+)
 
 
 def find_run(pid: int | None = None) -> int:
@@ -45,7 +47,7 @@ def change(run: int, overrides: Sequence[str]) -> str:
     ConfigError
         If it was refused, with the reason.
     """
-    reply = _ask(run, {"do": "set", "changes": list(overrides)}, _SLOW)
+    reply = _ask(run, {"do": "set", "changes": list(overrides)}, _ANSWER_TIMEOUT_S)
     if not reply.get("ok"):
         raise ConfigError(*str(reply.get("said", "refused")).splitlines())
     return str(reply["said"])
@@ -59,7 +61,7 @@ def status(run: int) -> dict[str, Any]:
     ConfigError
         If it does not answer.
     """
-    return _ask(run, {"do": "status"}, _SLOW)
+    return _ask(run, {"do": "status"}, _ANSWER_TIMEOUT_S)
 
 
 def stop(run: int) -> Stopped:
@@ -73,13 +75,13 @@ def stop(run: int) -> Stopped:
         If there is no such run any more.
     """
     with socket.socket(socket.AF_UNIX) as connection, suppress(OSError):
-        connection.settimeout(_TAKEN)
+        connection.settimeout(_STOP_RECEIPT_TIMEOUT_S)
         connection.connect(str(socket_of(run)))
         return _exchange_stop(connection)
     mailbox = mailbox_of(run)
     if mailbox is None:
         raise ConfigError(f"The run of process {run} listens no more: it has ended, or does so now.")
-    return stop_run(run, mailbox, lambda: is_alive(run), late=_TAKEN)
+    return stop_run(run, mailbox, lambda: is_alive(run), late=_STOP_RECEIPT_TIMEOUT_S)
 
 
 def stop_found(pid: int | None) -> tuple[int, Stopped] | DcmpError:
@@ -141,5 +143,5 @@ def _exchange(connection: socket.socket, request: dict[str, Any]) -> dict[str, A
 
 def _listed(runs: Sequence[int]) -> str:
     if not runs:
-        return _NONE
+        return _NO_RUN_ERROR
     return f"These listen: {', '.join(map(str, runs))}. Name one with --run PID."

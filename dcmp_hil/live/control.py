@@ -36,15 +36,15 @@ if TYPE_CHECKING:
     from dcmp_hil.ipc.mailbox import Answer
     from dcmp_hil.live.stopping import Stopped
 
-_LONGEST = 1 << 16  # bytes of a request
-_ANSWER = 1.0  # s for the loop to take a change
-_LOOK = 0.002  # s
-_SHOWN = 0.1  # s between two states that are sent to every watcher
-_ROUND = 0.05  # s between two looks at the run: whether it lives, and its newest period
-_HANDLERS = 4  # rounds between two looks of the loop at its signal handlers
-_ANSWERS = 0.3  # s for those who asked for STOP to be answered in, after the end
-_UP = b"u"
-_NUMBERS = 1 << 10  # of signals, that are taken at once
+_REQUEST_BYTES_MAX = 1 << 16  # bytes of a request
+_CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change
+_POLL_PERIOD_S = 0.002  # s
+_STATE_PERIOD_S = 0.1  # s between two states that are sent to every watcher
+_CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest period
+_SIGNAL_CHECK_ROUNDS = 4  # rounds between two looks of the loop at its signal handlers
+_STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in, after the end
+_STARTED_MESSAGE = b"u"
+_SIGNALS_BYTES_MAX = 1 << 10  # of signals, that are taken at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class Server:
     async def _watch(self, writer: asyncio.StreamWriter) -> None:
         while not self._over:  # behind the last words there is no state any more
             await _send(writer, self.state())
-            await asyncio.sleep(_SHOWN)
+            await asyncio.sleep(_STATE_PERIOD_S)
 
     def state(self) -> dict[str, Any]:
         """Return where the run stands, and how old that is."""
@@ -184,7 +184,7 @@ class Server:
         if answer is None:
             return {
                 "ok": False,
-                "said": f"The run did not take it within {_ANSWER:g} s: it is starting or ending.",
+                "said": f"The run did not take it within {_CHANGE_TIMEOUT_S:g} s: it is starting or ending.",
             }
         if answer.what != APPLIED:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
@@ -195,20 +195,22 @@ class Server:
         return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
 
     async def _dispatch(self, number: int) -> Answer | None:
-        for _ in range(round(_ANSWER / _LOOK)):
+        for _ in range(round(_CHANGE_TIMEOUT_S / _POLL_PERIOD_S)):
             if answer := self._mailbox.answer(number):
                 return answer
-            await asyncio.sleep(_LOOK)
+            await asyncio.sleep(_POLL_PERIOD_S)
         self._mailbox.withdraw()
         return self._mailbox.answer(number)
 
     async def say_goodbye(self) -> None:
         """Answer every waiting client, and tell every watcher how the run ended."""
-        await asyncio.sleep(_ROUND)  # requests that are on their way, a STOP among them, are read first
-        for _ in range(round(_ANSWERS / _LOOK)):
+        await asyncio.sleep(
+            _CHECK_PERIOD_S
+        )  # requests that are on their way, a STOP among them, are read first
+        for _ in range(round(_STOP_ANSWER_TIMEOUT_S / _POLL_PERIOD_S)):
             if not self._unanswered:
                 break
-            await asyncio.sleep(_LOOK)
+            await asyncio.sleep(_POLL_PERIOD_S)
         self._over = True
         ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
         for writer in tuple(self._watchers):
@@ -236,20 +238,20 @@ class _Watch:
             loop.add_signal_handler(number, self._server.stop, number)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         with suppress(OSError):
-            self._line.send(_UP)
+            self._line.send(_STARTED_MESSAGE)
         rounds = 0
         while self._server.look() and not self._closed.is_set() and not self._mailbox.ended:
             rounds += 1
-            if rounds % _HANDLERS == 0:
+            if rounds % _SIGNAL_CHECK_ROUNDS == 0:
                 self._mailbox.ask_handlers()
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._closed.wait(), _ROUND)
+                await asyncio.wait_for(self._closed.wait(), _CHECK_PERIOD_S)
         await self._server.say_goodbye()
 
     def _take(self) -> None:
         """Take the numbers of signals that the run was sent."""
         try:
-            numbers = self._line.recv(_NUMBERS)
+            numbers = self._line.recv(_SIGNALS_BYTES_MAX)
         except BlockingIOError:
             return
         except OSError:
@@ -272,7 +274,7 @@ async def _serve(line: socket.socket, server: Server, mailbox: Mailbox, path: Pa
         return
     _remove(path)  # of a process that had our number before
     before = os.umask(0o077)
-    listening = await listen(server.serve, path, _LONGEST)
+    listening = await listen(server.serve, path, _REQUEST_BYTES_MAX)
     os.umask(before)
     try:
         await watch.until_end()

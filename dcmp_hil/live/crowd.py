@@ -19,7 +19,7 @@ BETWEEN = 0.05  # s
 PATIENCE = 2.0  # s
 """For the next request of a connection."""
 _AT_ONCE = 32  # connections taken from the kernel: fewer than may wait, so that each can speak
-_QUEUE = 1024  # connections that the kernel keeps meanwhile
+_ACCEPT_QUEUE_MAX = 1024  # connections that the kernel keeps meanwhile
 
 
 class Crowd:
@@ -46,5 +46,5 @@ async def listen(serve: Serve, path: Path, limit: int) -> asyncio.Server:
     server = await asyncio.start_unix_server(serve, path, limit=limit, backlog=_AT_ONCE)
     for listening in server.sockets:
         with socket.fromfd(listening.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as again:
-            again.listen(_QUEUE)
+            again.listen(_ACCEPT_QUEUE_MAX)
     return server

@@ -29,10 +29,10 @@ _SLIDERS = {  # from, to; both above 0: by decades
     "at_s": (0.0, 60.0),
     "rest_s": (0.0, 10.0),
 }
-_HALVINGS, _NEAR = 12, 1e-3  # of the search; of a value, the nearest that is tried
-_FARTHEST = 1e9  # of a key without a bound
+_HALVINGS, _RELATIVE_STEP = 12, 1e-3  # of the search; of a value, the nearest that is tried
+_SLIDER_MAX = 1e9  # of a key without a bound
 _ANGLES = (-3.0, 3.0)
-_SLOWEST = 5.0  # rad/s, of the slider for mu0
+_MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
 _NO_KIND = ("custom", "csv")
 
 
@@ -56,7 +56,7 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
     start, end = _SLIDERS.get(name, _ANGLES)
     if name == "mu0_rad_s":
         high = min(high, 0.3 / rig.period)
-        start, end = _SLOWEST, high
+        start, end = _MU0_SLIDER_MIN_RAD_S, high
     low, high = _end(rig, key, value, low), _end(rig, key, value, high)
     start, end = max(start, low), min(end, high)
     return {
@@ -73,11 +73,11 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
 
 def _end(rig: Rig, key: str, value: float, bound: float) -> float:
     """Return how far a number may go from its value towards a bound: as far as a change would be taken."""
-    far = min(max(bound, -_FARTHEST), _FARTHEST)
+    far = min(max(bound, -_SLIDER_MAX), _SLIDER_MAX)
     if allowed(rig, key, far):
         return bound
     way = math.copysign(1.0, far - value)
-    near = _NEAR * max(abs(value), 1.0)
+    near = _RELATIVE_STEP * max(abs(value), 1.0)
     if abs(far - value) <= near or not allowed(rig, key, value + way * near):
         return value
     inside, outside = math.log(near), math.log(abs(far - value))

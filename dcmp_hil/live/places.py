@@ -14,9 +14,9 @@ from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.platform.user_folder import private, temporary, usable
 
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
-_LONGEST = 80  # characters: the path of a socket may have 107
+_SOCKET_PATH_CHARS_MAX = 80  # characters: the path of a socket may have 107
 _MAILBOX = "memfd:dcmp-hil mailbox"
-_PATIENCE = 0.5  # s to connect in
+_CONNECT_TIMEOUT_S = 0.5  # s to connect in
 
 
 def folder() -> Path:
@@ -29,8 +29,10 @@ def folder() -> Path:
     """
     base = os.environ.get("XDG_RUNTIME_DIR", "")
     try:
-        place = Path(base) / "dcmp-hil" if len(base) <= _LONGEST and usable(base) else temporary()
-        if len(str(place)) > _LONGEST:
+        place = (
+            Path(base) / "dcmp-hil" if len(base) <= _SOCKET_PATH_CHARS_MAX and usable(base) else temporary()
+        )
+        if len(str(place)) > _SOCKET_PATH_CHARS_MAX:
             place = Path("/tmp") / place.name  # noqa: S108 - its owner and mode are checked
         return private(place)
     except OSError as error:
@@ -83,7 +85,7 @@ def mailbox_of(pid: int) -> Mailbox | None:
 def _alive(path: Path) -> bool:
     """Whether a process listens there; no answer is waited for."""
     with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(_PATIENCE)
+        probe.settimeout(_CONNECT_TIMEOUT_S)
         try:
             probe.connect(str(path))
         except (ConnectionRefusedError, FileNotFoundError):

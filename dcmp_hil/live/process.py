@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.figures import Figures
 
-_COMING_UP = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
-_LOOK = 0.1  # s
-_LEAVING = 0.5  # s for it to leave in, at the end of a run
+_START_TIMEOUT_S = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
+_POLL_PERIOD_S = 0.1  # s
+_EXIT_TIMEOUT_S = 0.5  # s for it to leave in, at the end of a run
 _CODE = """
 import sys
 sys.path[:] = {path!r}
@@ -113,9 +113,9 @@ class ControlProcess:
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:
         """Wait until it listens; not for one that has ended. See `Control`."""
         clock = MonotonicClock()
-        end_ns = clock.now_ns() + int(1e9 * _COMING_UP)
+        end_ns = clock.now_ns() + int(1e9 * _START_TIMEOUT_S)
         while self._line is not None and self._watch.is_alive() and not stopped():
-            if select.select([self._line], [], [], _LOOK)[0] or clock.now_ns() > end_ns:
+            if select.select([self._line], [], [], _POLL_PERIOD_S)[0] or clock.now_ns() > end_ns:
                 return
 
     def close(self, last_words: str, *, confirmed: bool) -> None:
@@ -126,10 +126,10 @@ class ControlProcess:
             forget(self._line.fileno())
             self._line.close()
         if self._process is not None:
-            self._watch.join(_LEAVING)
+            self._watch.join(_EXIT_TIMEOUT_S)
             if self._watch.is_alive():
                 self._process.kill()
-                self._watch.join(_LEAVING)
+                self._watch.join(_EXIT_TIMEOUT_S)
 
     def _wait(self) -> None:
         """Wait for its end, on a thread that the kernel wakes only then, and that signals get through to."""

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 LIMIT = 1.0
 """s, within which STOP is confirmed or told as failed."""
 _NOT_TAKEN = (0.25, signal.SIGINT), (0.40, signal.SIGTERM), (0.60, signal.SIGKILL)
-_TAKEN = (0.50, signal.SIGINT), (0.60, signal.SIGTERM), (0.80, signal.SIGKILL)
+_SIGNAL_SCHEDULE_S = (0.50, signal.SIGINT), (0.60, signal.SIGTERM), (0.80, signal.SIGKILL)
 """s from STOP to each signal; a loop that has taken it has the time that a device takes to confirm 0 V."""
 _GIVEN_UP = 0.95  # s
-_LOOK = 0.002  # s
+_POLL_PERIOD_S = 0.002  # s
 
 
 class End(StrEnum):
@@ -84,7 +84,9 @@ def stop_run(
             return _gone(sent, after, watchdog) if mailbox.end not in SAID else _last_words(mailbox, after)
         if after > _GIVEN_UP:
             return _failed(pid)
-        due = [number for at, number in (_TAKEN if mailbox.stop_taken else _NOT_TAKEN) if at <= after]
+        due = [
+            number for at, number in (_SIGNAL_SCHEDULE_S if mailbox.stop_taken else _NOT_TAKEN) if at <= after
+        ]
         for number in due[len(sent) :]:
             mailbox.tell_forced()
             with suppress(OSError):
@@ -92,7 +94,7 @@ def stop_run(
             sent.append(number)
         if not mailbox.stop_taken:
             mailbox.ring_bell()
-        pause(_LOOK)
+        pause(_POLL_PERIOD_S)
 
 
 def is_alive(pid: int) -> bool:

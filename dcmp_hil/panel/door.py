@@ -22,10 +22,11 @@ WAITING, SERVED = 256, 64
 """Connections without a whole request, and with one."""
 BACKLOG = 64
 """Connections that are taken from the kernel at once: fewer than may wait, so that each can speak."""
-_PATIENCE = 2.0  # s for a whole request
-_PARTING = 0.5  # s for a refused client to take its answer
-_STRANGERS, _FRIENDS = 100.0, 300.0  # requests a second without the token and with it
-_STOP = b"/stop"
+_REQUEST_TIMEOUT_S = 2.0  # s for a whole request
+_REFUSAL_TIMEOUT_S = 0.5  # s for a refused client to take its answer
+_REQUESTS_WITHOUT_TOKEN_1_S = 100.0  # requests a second
+_REQUESTS_WITH_TOKEN_1_S = 300.0  # requests a second
+_STOP_PATH = b"/stop"
 
 
 class Bucket:
@@ -69,7 +70,7 @@ class Door:
         self._token = token.encode()
         self._waiting: dict[Visit, None] = {}
         self._served: dict[Visit, None] = {}
-        self._strangers, self._friends = Bucket(_STRANGERS), Bucket(_FRIENDS)
+        self._strangers, self._friends = Bucket(_REQUESTS_WITHOUT_TOKEN_1_S), Bucket(_REQUESTS_WITH_TOKEN_1_S)
 
     def __call__(self) -> Visit:
         """Make the protocol of a new connection."""
@@ -84,7 +85,7 @@ class Door:
     def refusal(self, visit: Visit, head: Head, request: bytes) -> int:
         """Let a whole request in; return the status with which it is refused, 0 if it is not."""
         known = self._token in request
-        if known and head.method == b"POST" and head.target == _STOP:
+        if known and head.method == b"POST" and head.target == _STOP_PATH:
             visit.is_stop = True
         elif not (self._friends if known else self._strangers).take():
             return HTTPStatus.TOO_MANY_REQUESTS
@@ -130,7 +131,7 @@ class Visit(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)  # noqa: S101 - of a stream, as the server made it
         self._transport = transport
         self._late = asyncio.get_running_loop().call_later(
-            _PATIENCE, self._refuse, HTTPStatus.REQUEST_TIMEOUT
+            _REQUEST_TIMEOUT_S, self._refuse, HTTPStatus.REQUEST_TIMEOUT
         )
         self._door.admit(self)
 
@@ -206,7 +207,7 @@ class Visit(asyncio.Protocol):
             f"Content-Length: {len(reason)}\r\nConnection: close\r\n\r\n{reason}".encode()
         )
         transport.write_eof()  # closed at once, with bytes unread, it would take the answer back
-        self._late = asyncio.get_running_loop().call_later(_PARTING, transport.abort)
+        self._late = asyncio.get_running_loop().call_later(_REFUSAL_TIMEOUT_S, transport.abort)
 
     def _settled(self) -> None:
         if self._late is not None:

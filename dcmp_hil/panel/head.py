@@ -9,14 +9,14 @@ HEAD_BYTES = 1 << 13
 """Bytes of request line and header fields."""
 BODY_BYTES = 1 << 14
 """Bytes of a body."""
-_FIELDS = 64
-_TARGET = 2048  # characters
+_HEADERS_MAX = 64
+_TARGET_CHARS_MAX = 2048  # characters
 _END = b"\r\n\r\n"
-_ODD = re.compile(rb"[^\x20-\x7e\r\n\t]|(?<!\r)\n|\r[^\n]")
+_FORBIDDEN_BYTES = re.compile(rb"[^\x20-\x7e\r\n\t]|(?<!\r)\n|\r[^\n]")
 _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*(.*?)[ \t]*")
 _LINE = re.compile(rb"([A-Z]{1,20}) (/[\x21-\x7e]*) HTTP/1\.[01]")
 _METHODS = {b"GET", b"HEAD", b"POST"}
-_ONCE = {b"host", b"content-length", b"origin", b"cookie", b"content-type"}
+_UNIQUE_HEADERS = {b"host", b"content-length", b"origin", b"cookie", b"content-type"}
 _REFUSED = {b"transfer-encoding": 411, b"content-encoding": 415, b"expect": 417, b"upgrade": 400}
 _OF_CONNECTION = {b"connection", b"keep-alive", b"proxy-connection", b"te", b"trailer"}
 
@@ -63,7 +63,7 @@ def head_of(data: bytes) -> Head | None:
     head = data[: end + 2] if end >= 0 else data
     if len(head) > HEAD_BYTES:
         raise RequestError(431)
-    if _ODD.search(head):
+    if _FORBIDDEN_BYTES.search(head):
         raise RequestError
     if end < 0:
         return None
@@ -80,13 +80,13 @@ def _request_line(line: bytes) -> tuple[bytes, bytes]:
     method, target = found.groups()
     if method not in _METHODS:
         raise RequestError(405)
-    if len(target) > _TARGET:
+    if len(target) > _TARGET_CHARS_MAX:
         raise RequestError(414)
     return method, target
 
 
 def _fields(lines: list[bytes]) -> tuple[tuple[bytes, bytes], ...]:
-    if len(lines) > _FIELDS:
+    if len(lines) > _HEADERS_MAX:
         raise RequestError(431)
     fields = []
     for line in lines:
@@ -98,7 +98,7 @@ def _fields(lines: list[bytes]) -> tuple[tuple[bytes, bytes], ...]:
     for name in names:
         if name in _REFUSED:
             raise RequestError(_REFUSED[name])
-        if name in _ONCE and names.count(name) > 1:
+        if name in _UNIQUE_HEADERS and names.count(name) > 1:
             raise RequestError
     if b"host" not in names:
         raise RequestError

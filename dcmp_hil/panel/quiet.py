@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _NAMES = ("aiohttp.server", "aiohttp.web", "aiohttp.internal", "aiohttp.access", "asyncio")
-_KINDS = 20  # of lines
+_LINE_KINDS_MAX = 20  # of lines
 
 
 class _OnceEach(logging.Filter):
@@ -25,7 +25,7 @@ class _OnceEach(logging.Filter):
         """Tell whether a line is the first of its kind; its traceback is left out."""
         error = record.exc_info[0] if record.exc_info else None
         kind = f"{record.name} {record.msg[:80] if isinstance(record.msg, str) else ''} {error}"
-        if kind in self._seen or len(self._seen) >= _KINDS:
+        if kind in self._seen or len(self._seen) >= _LINE_KINDS_MAX:
             return False
         self._seen.add(kind)
         if error is not None:

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 _PAGE = resources.files("dcmp_hil.panel").joinpath("page")
 _FILES = {"/": "text/html", "/panel.css": "text/css", "/panel.js": "text/javascript"}
-_EVERY = 0.15  # s between two states that a page is sent
-_QUEUE = 1024  # connections that the kernel keeps while this process is busy
-_FRESH = 1.0  # s: a STOP that is older was pressed for something that has passed, or for another run
+_STATE_PERIOD_S = 0.15  # s between two states that a page is sent
+_ACCEPT_QUEUE_MAX = 1024  # connections that the kernel keeps while this process is busy
+_STOP_AGE_MAX_S = 1.0  # s: a STOP that is older was pressed for something that has passed, or for another run
 _NO_RUN = "There is no run."
 
 
@@ -129,7 +129,7 @@ class Panel:
             while not self._ending.is_set():
                 state = {**self._watcher.state, "server_ms": _now_ms()}
                 await answer.write(f"data: {json.dumps(state)}\n\n".encode())
-                await asyncio.sleep(_EVERY)
+                await asyncio.sleep(_STATE_PERIOD_S)
         except ConnectionError:  # the page was closed
             pass
         return answer
@@ -164,7 +164,7 @@ class Panel:
     async def _stop_fresh(self, run: int, pressed_ms: float) -> str:
         def stop_it() -> str:
             waited = 1e-3 * (_now_ms() - pressed_ms)
-            if waited > _FRESH:
+            if waited > _STOP_AGE_MAX_S:
                 raise ConfigError(
                     f"STOP not confirmed: it waited for {waited:.1f} s and was dropped. Press it again."
                 )
@@ -185,7 +185,7 @@ def _keep_more_waiting(listening: socket.socket) -> None:
     """Have the kernel keep more connections than are taken from it at once."""
     again = socket.fromfd(listening.fileno(), socket.AF_INET, socket.SOCK_STREAM)
     with again:
-        again.listen(_QUEUE)
+        again.listen(_ACCEPT_QUEUE_MAX)
 
 
 async def _pressed_ms(request: web.Request) -> float:

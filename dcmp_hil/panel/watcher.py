@@ -10,9 +10,9 @@ from typing import Any
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.places import running, socket_of
 
-_LOOK = 0.5  # s between two looks for a run
-_SILENT = 1.0  # s without a state after which the page says so
-_LINE = 1 << 16  # bytes
+_SEARCH_PERIOD_S = 0.5  # s between two looks for a run
+_SILENCE_MAX_S = 1.0  # s without a state after which the page says so
+_LINE_BYTES_MAX = 1 << 16  # bytes
 
 
 class Watcher:
@@ -46,7 +46,7 @@ class Watcher:
                 self.run = None
                 if self.state["connection"] != "ended":
                     self.state = {"connection": "ended", "ended": "its control process is gone."}
-            await asyncio.sleep(_LOOK)
+            await asyncio.sleep(_SEARCH_PERIOD_S)
 
     def _find(self) -> int | None:
         try:
@@ -58,7 +58,7 @@ class Watcher:
         return runs[-1] if runs else None
 
     async def _follow(self, pid: int) -> None:
-        reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE)
+        reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE_BYTES_MAX)
         self.run = pid
         try:
             writer.write(b'{"do": "watch"}\n')
@@ -72,7 +72,7 @@ class Watcher:
         """Return the next line; while none comes, the page is told."""
         waiting = asyncio.ensure_future(reader.readline())
         while True:
-            done, _ = await asyncio.wait({waiting}, timeout=_SILENT)
+            done, _ = await asyncio.wait({waiting}, timeout=_SILENCE_MAX_S)
             if done:
                 return waiting.result()
             self.state = {**self.state, "connection": "silent"}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 
-_SETTLED = 0.1  # rad/s: the velocity estimate has arrived when its error stays below this
+_SETTLED_ERROR_MAX_RAD_S = 0.1  # rad/s: the velocity estimate has arrived when its error stays below this
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def measure(result: Result) -> Measures:
         tracking_rms_rad=_known(figures.tracking_rms_rad),
         velocity_error_max_rad_s=_known(figures.velocity_error_max_rad_s),
         disturbance_error_rms_rad_s2=_known(figures.disturbance_error_rms_rad_s2),
-        velocity_settled_s=settled_from(columns["time_s"], velocity_error, _SETTLED),
+        velocity_settled_s=settled_from(columns["time_s"], velocity_error, _SETTLED_ERROR_MAX_RAD_S),
         voltage_peak_V=_known(figures.voltage_peak_V),
         damping=damping(result.rig),
     )

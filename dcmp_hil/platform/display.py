@@ -6,8 +6,8 @@ import os
 import subprocess
 import sys
 
-_PATIENCE = 20.0  # s for a display that is far away, or frozen; one that is gone is known at once
-_ASK = """
+_CONNECT_TIMEOUT_S = 20.0  # s for a display that is far away, or frozen; one that is gone is known at once
+_CONNECT_CODE = """
 import ctypes, sys
 library, function = sys.argv[1:]
 connect = getattr(ctypes.CDLL(library), function)
@@ -36,11 +36,11 @@ def display_problem() -> str:
             continue
         try:
             done = subprocess.run(  # noqa: S603 - our own code
-                [sys.executable, "-I", "-S", "-c", _ASK, library, function],
+                [sys.executable, "-I", "-S", "-c", _CONNECT_CODE, library, function],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                timeout=_PATIENCE,
+                timeout=_CONNECT_TIMEOUT_S,
                 check=False,
             )
         except (OSError, subprocess.TimeoutExpired):

@@ -7,8 +7,8 @@ from contextlib import suppress
 from pathlib import Path
 
 _TABLE = Path("/proc/net/tcp")
-_CONNECTED = {"01", "04", "05", "08"}  # established, and on the way out with what was read
-_PEOPLE = range(1000, 60_000)  # user numbers, as distributions give them
+_CONNECTED_STATES = {"01", "04", "05", "08"}  # established, and on the way out with what was read
+_PERSON_USER_IDS = range(1000, 60_000)  # user numbers, as distributions give them
 _ROOT = 0  # may do as it likes, and reads this process's memory
 
 
@@ -19,7 +19,7 @@ def strangers(port: int) -> list[int]:
         rows = [line.split() for line in _TABLE.read_text("ascii").splitlines()[1:]]
     except OSError:  # not Linux: it cannot be found out
         return []
-    users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED}
+    users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED_STATES}
     return sorted(users - {os.getuid(), _ROOT})
 
 
@@ -30,6 +30,6 @@ def others_here() -> bool:
             if place.name.isdigit():
                 with suppress(OSError):
                     user = place.stat().st_uid
-                    if user in _PEOPLE and user != os.getuid():
+                    if user in _PERSON_USER_IDS and user != os.getuid():
                         return True
     return False

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.sections import TimingSection
 
-_HELPERS = 1  # the lowest real-time priority
-_LONGEST = 80_000  # us that a real-time thread may run without a sleep; a helper may wake it every 100 ms
+_HELPER_PRIORITY = 1  # the lowest real-time priority
+_RUN_WITHOUT_SLEEP_MAX_US = 80_000
+"""Microseconds that a real-time thread may run without a sleep; a helper may wake it every 100 ms."""
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall
 _TIMER_SLACK = 29  # prctl: PR_SET_TIMERSLACK
 _USUAL_SLACK = 0  # ns; 0 means: as the process began
@@ -126,8 +127,8 @@ class RealTime:
         self.grants.append(
             Grant(
                 "SCHED_FIFO to the end",
-                f"taken back after {1e-3 * _LONGEST:.0f} ms without a sleep. If that happens again, a period "
-                "has more to do than time for it: lower loop.rate_hz",
+                f"taken back after {1e-3 * _RUN_WITHOUT_SLEEP_MAX_US:.0f} ms without a sleep. If that "
+                "happens again, a period has more to do than time for it: lower loop.rate_hz",
             )
         )
 
@@ -217,7 +218,7 @@ def _be_first(timing: TimingSection, undo: ExitStack) -> None:
     _raise_to(timing.priority, mine, undo)
     for helper in set(_threads()) - {mine}:
         with suppress(ProcessLookupError):  # it has just ended
-            _raise_to(_HELPERS, helper, undo)
+            _raise_to(_HELPER_PRIORITY, helper, undo)
 
 
 def _watch(undo: ExitStack, step_down: Callable[[int, FrameType | None], None]) -> None:
@@ -227,12 +228,12 @@ def _watch(undo: ExitStack, step_down: Callable[[int, FrameType | None], None]) 
     import resource  # POSIX only, as all of this; the module is imported by runs in virtual time, too
 
     soft, hard = resource.getrlimit(resource.RLIMIT_RTTIME)
-    if hard != resource.RLIM_INFINITY and hard <= _LONGEST:
+    if hard != resource.RLIM_INFINITY and hard <= _RUN_WITHOUT_SLEEP_MAX_US:
         return
     before = signal.signal(signal.SIGXCPU, step_down) or signal.SIG_DFL
     undo.callback(signal.signal, signal.SIGXCPU, before)
     undo.callback(resource.setrlimit, resource.RLIMIT_RTTIME, (soft, hard))
-    resource.setrlimit(resource.RLIMIT_RTTIME, (_LONGEST, hard))
+    resource.setrlimit(resource.RLIMIT_RTTIME, (_RUN_WITHOUT_SLEEP_MAX_US, hard))
 
 
 # ---------------------------------------------------------------- the system itself

@@ -8,7 +8,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-_MINE = 0o700
+_OWNER_ONLY_MODE = 0o700
 
 
 def usable(folder: str) -> bool:
@@ -35,7 +35,7 @@ def private(place: Path) -> Path:
     OSError
         If it cannot be made, or is one that another user made, or may enter.
     """
-    place.mkdir(mode=_MINE, exist_ok=True)
+    place.mkdir(mode=_OWNER_ONLY_MODE, exist_ok=True)
     found = place.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
         raise OSError(errno.EPERM, "it is no folder of yours alone", str(place))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 
-_OURS = ("dcmp_hil", "sim_backend")  # they run already: a checkout in the current folder is no second one
+_PACKAGES = ("dcmp_hil", "sim_backend")  # they run already: a checkout in the current folder is no second one
 
 
 class Place(NamedTuple):
@@ -75,7 +75,7 @@ def locate(module: str, folders: Sequence[Path], said: str) -> Place | None:
     """
     importlib.invalidate_caches()  # the file may have been written a moment ago
     parts = module.split(".")
-    others = () if parts[0] in _OURS else _absolute(folders)
+    others = () if parts[0] in _PACKAGES else _absolute(folders)
     searched = [_place(parts, None), *(_place(parts, [folder]) for folder in others)]
     places = {os.path.realpath(place.where): place for place in reversed(searched) if place is not None}
     if len(places) > 1:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from types import TracebackType
 
-_HERE = str(Path(__file__).parent)
-_LONGEST = 300  # characters of a message
+_PACKAGE_FOLDER = str(Path(__file__).parent)
+_SHOWN_CHARS_MAX = 300  # characters of a message
 _LONGEST_VALUE = 60
 REMEDY = "Correct it there."
 
@@ -22,8 +22,8 @@ def message_of(error: BaseException) -> str:
         text = " ".join(str(error).split())
     except Exception:  # noqa: BLE001 - its __str__ is the user's own code, too
         text = ""
-    if len(text) > _LONGEST:
-        text = f"{text[:_LONGEST]} ..."
+    if len(text) > _SHOWN_CHARS_MAX:
+        text = f"{text[:_SHOWN_CHARS_MAX]} ..."
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
@@ -97,7 +97,7 @@ def _lines(trace: TracebackType | None) -> list[tuple[str, int]]:
     found = []
     while trace is not None:
         file = trace.tb_frame.f_code.co_filename
-        if not file.startswith(("<frozen importlib", _HERE)):
+        if not file.startswith(("<frozen importlib", _PACKAGE_FOLDER)):
             found.append((file, trace.tb_lineno))
         trace = trace.tb_next
     return found

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from pathlib import Path
 
-_ROOM = 8 << 20  # bytes that wait at most: a minute at 1 kHz
+_WAITING_BYTES_MAX = 8 << 20  # bytes that wait at most: a minute at 1 kHz
 
 
 class Piece(NamedTuple):
@@ -57,7 +57,7 @@ class Backlog:
         If the file cannot be made.
     """
 
-    def __init__(self, path: Path, room: int = _ROOM) -> None:
+    def __init__(self, path: Path, room: int = _WAITING_BYTES_MAX) -> None:
         self._file = path.open("wb", buffering=0)
         self.room = room
         self._made = bytearray()  # of the piece that is being made

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _FOOTER = struct.Struct("<BQQQI")
 _DATA_END = HEAD.size + 4  # bytes
-_LONGEST = 1 << 16  # bytes of the attachment at the end
+_ATTACHMENT_BYTES_MAX = 1 << 16  # bytes of the attachment at the end
 
 
 class Ending(NamedTuple):
@@ -38,7 +38,7 @@ def ending_of(path: Path) -> Ending | None:
     try:
         with path.open("rb") as file:
             size = file.seek(0, os.SEEK_END)
-            file.seek(max(0, size - _LONGEST))
+            file.seek(max(0, size - _ATTACHMENT_BYTES_MAX))
             tail = file.read()
             footer_at = len(tail) - len(MAGIC) - _FOOTER.size
             if footer_at < 0 or not tail.endswith(MAGIC):
@@ -47,8 +47,8 @@ def ending_of(path: Path) -> Ending | None:
             if opcode != Op.FOOTER:
                 return None
             end = (summary or size - len(tail) + footer_at) - _DATA_END
-            file.seek(max(0, end - _LONGEST))
-            return _ending_in(file.read(min(end, _LONGEST)))
+            file.seek(max(0, end - _ATTACHMENT_BYTES_MAX))
+            return _ending_in(file.read(min(end, _ATTACHMENT_BYTES_MAX)))
     except (OSError, ValueError, RecordError):
         return None
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.reader import RecordedRun
 
 _ROW_GROUP = 1 << 16  # rows of a row group
-_TWICE = (  # what a replay says a second time
+_REPLAYED_COLUMNS = (  # what a replay says a second time
     "position_estimate_rad",
     "velocity_estimate_rad_s",
     "disturbance_estimate_rad_s2",
@@ -71,11 +71,11 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
 
 def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
     """Write what observer and controller said then and now, one row a period."""
-    wanted = ("time_s", *_TWICE)
+    wanted = ("time_s", *_REPLAYED_COLUMNS)
     now = tuple(_now(again).values())
     with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow((*wanted, *(f"{name}_again" for name in _TWICE)))
+        writer.writerow((*wanted, *(f"{name}_again" for name in _REPLAYED_COLUMNS)))
         first = 0
         for block in run.blocks():
             then, end = columns(block), first + len(block)
@@ -101,7 +101,7 @@ def _write_rows(writer: Any, table: Iterable[NDArray[np.float64]]) -> None:
 
 
 def _now(again: Again) -> dict[str, NDArray[np.float64]]:
-    return dict(zip(_TWICE, (*again.estimate.T, again.demand), strict=True))
+    return dict(zip(_REPLAYED_COLUMNS, (*again.estimate.T, again.demand), strict=True))
 
 
 @contextmanager

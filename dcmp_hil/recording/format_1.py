@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Level
 
 _APPLIED = re.compile(r"(.*), applied at t = [0-9.]+ s")
-_ONE = re.compile(r"([a-z_]+\.\w+)(?:: .{0,200}? -> | = )(.{0,200}?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
+_ONE_CHANGE = re.compile(r"([a-z_]+\.\w+)(?:: .{0,200}? -> | = )(.{0,200}?)(?=, [a-z_]+\.\w+(?:: | = )|$)")
 _LOWERING = "lowering the arm"
 _LEVELS: Mapping[str, Level] = {"INFO": "INFO", "WARN": "WARN", "ERROR": "ERROR"}
 
@@ -51,7 +51,7 @@ def event_of_format_1(document: Mapping[str, Any]) -> Event:
 def _changed(text: str) -> dict[str, float | str]:
     """Return each key that a text says was changed, with its new value; nothing for other texts."""
     words = _APPLIED.fullmatch(text)
-    return {key: parse_value(value) for key, value in _ONE.findall(words[1])} if words else {}
+    return {key: parse_value(value) for key, value in _ONE_CHANGE.findall(words[1])} if words else {}
 
 
 def _counters(text: str) -> dict[str, int]:

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 _MOST_TOLD = 20  # sentences
-_LONGEST = 10_000  # characters of what is said of a run
-_OLDER = (
+_TEXT_CHARS_MAX = 10_000  # characters of what is said of a run
+_UNCHECKED_NOTE = (
     "it has the older layout: what it says of its run (version, note, faults) is under no checksum, and "
     "whether an event is missing is known only where the file ended properly"
 )
@@ -143,7 +143,7 @@ def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
     event_of = event_of_format_1 if older else event_from
     ordered = in_order(found.messages, found.began_ns, periods, events, event_of)
     damage = _told(found, scanner, (*found.faults, *found.messages.faults, *ordered.faults), ordered.gaps)
-    unchecked = (_OLDER,) if older else ()
+    unchecked = (_UNCHECKED_NOTE,) if older else ()
     complete = not damage and not unchecked and scanner.closed and scanner.data_checked is True
     if not complete and not damage and not unchecked:
         damage = ("it has no checksum over all of it: another program wrote it",)
@@ -243,7 +243,10 @@ class _Found:
             said = {"format": FORMAT_1}
         if said is None:
             raise ConfigError(f"{path}: this is no recording of dcmp-hil, or its very beginning is missing.")
-        run = {readable(str(key))[:_LONGEST]: readable(str(text))[:_LONGEST] for key, text in said.items()}
+        run = {
+            readable(str(key))[:_TEXT_CHARS_MAX]: readable(str(text))[:_TEXT_CHARS_MAX]
+            for key, text in said.items()
+        }
         if run.get("format") not in {FORMAT, FORMAT_1}:
             raise ConfigError(
                 f"{path}: a recording of format {run.get('format', 'unknown'):.20}; this version reads "

@@ -22,7 +22,7 @@ HEAD = struct.Struct("<BQ")
 LARGEST_CHUNK = 16 << 20
 """Bytes of a block, unpacked; this program writes some kB, `mcap recover` writes 4 MiB."""
 _LARGEST_TEXT = 1 << 20  # bytes of an attachment or a metadata record
-_LARGEST = 64 << 20  # bytes of any other record
+_RECORD_BYTES_MAX = 64 << 20  # bytes of any other record
 _WINDOW = 1 << 23  # bytes that zstd may look back: what level 19 asks for
 _CHUNK = struct.Struct("<QQQII")
 _ATTACHMENT = struct.Struct("<QQI")
@@ -66,7 +66,7 @@ def length_allowed(opcode: int, length: int) -> bool:
     """Return whether a record of this kind may be so long (bytes)."""
     if opcode in {Op.ATTACHMENT, Op.METADATA, Op.SCHEMA, Op.CHANNEL, Op.HEADER}:
         return length <= _LARGEST_TEXT
-    return length <= _LARGEST
+    return length <= _RECORD_BYTES_MAX
 
 
 def size_of_chunk(content: bytes) -> int:

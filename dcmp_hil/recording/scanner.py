@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import IO
 
-_ROOM, _PER_BYTE = 64 << 20, 16  # what blocks may unpack to: bytes, and per byte of the file
-_WINDOW, _OVERLAP = 1 << 20, 64  # bytes that are searched at a time
-_SEARCHED = 8  # times the size of the file that is looked at, or unpacked, in search of records
+_UNPACKED_BYTES_MAX = 64 << 20  # of all blocks of a small file
+_UNPACKED_BYTES_PER_BYTE = 16  # more of them for each byte of the file
+_WINDOW_BYTES, _OVERLAP_BYTES = 1 << 20, 64  # bytes that are searched at a time
+_SEARCH_RATIO_MAX = 8  # times the size of the file that is looked at, or unpacked, in search of records
 # How a record that is found again looks, and how far behind its beginning.
 _LANDMARKS = re.compile(
     rb"(?s:(?P<chunk>(?:\x04\0\0\0zstd|\x03\0\0\0lz4))"
@@ -40,7 +41,7 @@ _LANDMARKS = re.compile(
     rb"|(?P<end>\x0f\x04\0{7}|\x02\x14\0{7}))"
 )
 _LENGTH = struct.Struct("<Q")
-_BEHIND = {"chunk": 37, "attachment": 25, "end": 0}
+_LENGTH_OFFSETS = {"chunk": 37, "attachment": 25, "end": 0}
 
 
 class Record(NamedTuple):
@@ -100,7 +101,7 @@ class Scanner:
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file, self._size = file, size
-        self._room = _ROOM + _PER_BYTE * size
+        self._room = _UNPACKED_BYTES_MAX + _UNPACKED_BYTES_PER_BYTE * size
         self._searched = 0
         self._crc = 0
         self._in_one_piece = True
@@ -194,14 +195,14 @@ class Scanner:
         """Return where the first record from `at` on begins that can be trusted; the file's end if none."""
         first = at
         while at < self._size:
-            window = self._bytes(at, _WINDOW)
+            window = self._bytes(at, _WINDOW_BYTES)
             for found in _LANDMARKS.finditer(window):
-                start = at + found.start() - _BEHIND[found.lastgroup or "end"]
+                start = at + found.start() - _LENGTH_OFFSETS[found.lastgroup or "end"]
                 if start >= first and self._trusted(start):
                     return start
-                if self._searched > _SEARCHED * self._size + _ROOM:
+                if self._searched > _SEARCH_RATIO_MAX * self._size + _UNPACKED_BYTES_MAX:
                     return self._size
-            at += max(1, len(window) - _OVERLAP) if len(window) == _WINDOW else _WINDOW
+            at += max(1, len(window) - _OVERLAP_BYTES) if len(window) == _WINDOW_BYTES else _WINDOW_BYTES
         return self._size
 
     def _trusted(self, start: int) -> bool:

@@ -17,7 +17,12 @@ _BOMS = (
     (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )
-_SHOWN = {"utf-8-sig": "UTF-8", "utf-16-le": "UTF-16", "utf-16-be": "UTF-16", "cp1252": "Windows-1252"}
+_ENCODING_NAMES = {
+    "utf-8-sig": "UTF-8",
+    "utf-16-le": "UTF-16",
+    "utf-16-be": "UTF-16",
+    "cp1252": "Windows-1252",
+}
 _OTHER_FILES = (
     (b"PK\x03\x04", "a zip or Excel workbook"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook"),
@@ -29,12 +34,12 @@ _OTHER_FILES = (
     (b"#ROSBAG", "a ROS bag"),
     (b"\x89MCAP", "an MCAP file"),
 )
-_HEAD = 4096  # bytes that the encoding is told from
+_ENCODING_SAMPLE_BYTES = 4096  # bytes that the encoding is told from
 _LINE_MAX = 1_000_000  # characters
 _FILE_MAX_MIB = 128  # an hour at 1 kHz in three columns; reading takes about 17 times as much memory
-_WIDE = 0.3  # share of NULs on one side of UTF-16 text
-_BINARY = 0.1  # share of control characters that no text has
-_END = re.compile(r"\r\n|\n|\r")
+_UTF16_NULS_SHARE_MIN = 0.3  # share of NULs on one side of UTF-16 text
+_CONTROL_CHARS_SHARE_MIN = 0.1  # share of control characters that no text has
+_LINE_END = re.compile(r"\r\n|\n|\r")
 
 
 class Lines(NamedTuple):
@@ -82,13 +87,13 @@ def read_lines(path: Path) -> Lines:
             raise ConfigError(f"{path}: this is {what}, not text. Save it as CSV.")
     text, encoding = _decode(raw)
     notes = [f"Read as {encoding} text."] if encoding not in ("UTF-8", "utf-8") else []
-    head = text[:_HEAD].replace("\0", "")
-    if len(re.findall(r"[\x01-\x08\x0e-\x1f\ufffd]", head)) > _BINARY * max(1, len(head)):
+    head = text[:_ENCODING_SAMPLE_BYTES].replace("\0", "")
+    if len(re.findall(r"[\x01-\x08\x0e-\x1f\ufffd]", head)) > _CONTROL_CHARS_SHARE_MIN * max(1, len(head)):
         raise ConfigError(f"{path}: not a text file. Save it as comma-separated text.")
     nuls = text.count("\0")
     if nuls:
         notes.append(f"The file has {nuls} NUL characters: a number that holds one is left out.")
-    lines = [line.strip("\0\x1a\ufeff") for line in _END.split(text)]
+    lines = [line.strip("\0\x1a\ufeff") for line in _LINE_END.split(text)]
     if (longest := max(map(len, lines))) > _LINE_MAX:
         raise ConfigError(
             f"{path}: a line has {longest:,} characters, which no row of a recording has. Save it as "
@@ -99,9 +104,11 @@ def read_lines(path: Path) -> Lines:
 
 def _decode(raw: bytes) -> tuple[str, str]:
     """Return the text, and the encoding's usual name."""
-    encoding = next((name for bom, name in _BOMS if raw.startswith(bom)), None) or _wide(raw[:_HEAD])
+    encoding = next((name for bom, name in _BOMS if raw.startswith(bom)), None) or _wide(
+        raw[:_ENCODING_SAMPLE_BYTES]
+    )
     if encoding is not None:
-        return raw.decode(encoding, "replace"), _SHOWN.get(encoding, encoding.upper())
+        return raw.decode(encoding, "replace"), _ENCODING_NAMES.get(encoding, encoding.upper())
     text = raw.decode("utf-8", "replace")
     broken = text.count("\ufffd")
     if not broken:
@@ -109,7 +116,7 @@ def _decode(raw: bytes) -> tuple[str, str]:
     foreign = sum(1 for sign in text if ord(sign) > 127) - broken  # noqa: PLR2004 - the last of ASCII
     if foreign > broken:  # damaged UTF-8 is still that
         return text, "UTF-8"
-    return raw.decode("cp1252", "replace"), _SHOWN["cp1252"]
+    return raw.decode("cp1252", "replace"), _ENCODING_NAMES["cp1252"]
 
 
 def _wide(head: bytes) -> str | None:
@@ -118,6 +125,6 @@ def _wide(head: bytes) -> str | None:
         return None
     for encoding, side, other in (("utf-16-le", 1, 0), ("utf-16-be", 0, 1)):
         nuls, rest = head[side::2].count(0), head[other::2].count(0)
-        if nuls > _WIDE * len(head) and rest < 0.1 * nuls:
+        if nuls > _UTF16_NULS_SHARE_MIN * len(head) and rest < 0.1 * nuls:
             return encoding
     return None

@@ -13,17 +13,18 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-_FEW = 0.05  # share of the rows whose stamp may repeat the one before in a clock that is fine otherwise
-_FINE = 0.05  # of a step: stamps of that resolution are taken as they are
-_WINDOW = 64  # rows that a period is averaged over
+_REPEATED_STAMPS_SHARE_MAX = 0.05
+"""Share of the rows whose stamp may repeat the one before in a clock that is fine otherwise."""
+_STAMP_RESOLUTION_MAX_STEPS = 0.05  # of a step: stamps of that resolution are taken as they are
+_AVERAGE_ROWS = 64  # rows that a period is averaged over
 _SHORT_WINDOW = 10
-_FEWEST = 8  # rows that tell a period
-_AGREES = 0.02  # between a period that is told and the one that the stamps show
-_LOSS = 0.75  # of a period, by which the stamps move on where a row was lost
-_KINDS = 6  # of steps that a coarse clock shows
+_PERIOD_ROWS_MIN = 8  # rows that tell a period
+_PERIOD_TOLERANCE = 0.02  # between a period that is told and the one that the stamps show
+_LOST_ROW_STEP_PERIODS = 0.75  # of a period, by which the stamps move on where a row was lost
+_COARSE_STEP_KINDS = 6  # of steps that a coarse clock shows
 _FEWEST_STAMPS = 50  # that tell a period to a thousandth
-_ROUNDING = 1e-6  # s
-_LONGEST = 1e15  # of them
+_ROUNDING_S = 1e-6  # s
+_TICKS_MAX = 1e15  # of them
 
 
 class _Grid(NamedTuple):
@@ -52,12 +53,12 @@ def even_rows(time: Column, period: float | None, name: str, notes: list[str]) -
     ConfigError
         If the stamps contradict `period`, or repeat themselves in rows that are not evenly sampled.
     """
-    if len(time) < _FEWEST:
+    if len(time) < _PERIOD_ROWS_MIN:
         return np.arange(len(time), dtype=np.float64) * period if period else _spread(time)
     if period is not None:
         return _told(time, period, name, notes)
     repeated = int(np.count_nonzero(np.diff(time) <= 0.0))
-    if repeated >= _FEW * len(time):
+    if repeated >= _REPEATED_STAMPS_SHARE_MAX * len(time):
         return _coarse(time, repeated, name, notes)
     if repeated:
         notes.append(f"{repeated} of the stamps repeat the one before: their rows are spread up to the next.")
@@ -69,13 +70,15 @@ def _rounded(time: Column, notes: list[str]) -> Column:
     """Return the stamps, or an even grid that they were rounded from."""
     steps = np.diff(time)
     resolution = _resolution(steps)
-    if resolution < _FINE * float(np.median(steps)):
+    if resolution < _STAMP_RESOLUTION_MAX_STEPS * float(np.median(steps)):
         return time
     grid = _fit(time, resolution)
     multiple = grid.period / resolution
     # Near one step a longer one may be a lost row; near several of them it is the rounding only.
-    unsure = abs(multiple - round(multiple)) < (_FINE if round(multiple) == 1 else _ROUNDING)
-    if grid.spread > 1.1 * resolution + _ROUNDING or unsure:
+    unsure = abs(multiple - round(multiple)) < (
+        _STAMP_RESOLUTION_MAX_STEPS if round(multiple) == 1 else _ROUNDING_S
+    )
+    if grid.spread > 1.1 * resolution + _ROUNDING_S or unsure:
         return time
     notes.append(_said(grid, f"The stamps are as coarse as {resolution:.4g} s"))
     return grid.number * grid.period
@@ -110,13 +113,13 @@ def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
     number = _numbered(time, period, resolution)
     off = time - period * number
     grid = _Grid(number, period, float(np.ptp(off))) if few else _fit(time, resolution, period)
-    if abs(grid.period / period - 1.0) > _AGREES:
+    if abs(grid.period / period - 1.0) > _PERIOD_TOLERANCE:
         raise ConfigError(
             f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {period:g} s. Leave "
             "--period out, or say --time none: then the stamps do not count."
         )
     if grid.spread > resolution + grid.period:
-        if repeated >= _FEW * len(time):
+        if repeated >= _REPEATED_STAMPS_SHARE_MAX * len(time):
             raise ConfigError(
                 f"{name}: by the stamps the rows are not evenly sampled, {period:g} s apart: they differ "
                 f"from that by {grid.spread:.4g} s. Say --time none if the stamps do not count."
@@ -131,7 +134,7 @@ def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
 
 def _fit(time: Column, resolution: float, told: float | None = None) -> _Grid:
     """Return the even grid that fits the stamps best."""
-    window = min(_WINDOW, len(time) - 1)
+    window = min(_AVERAGE_ROWS, len(time) - 1)
     means = (time[window:] - time[:-window]) / window
     usual = float(np.median(means))
     near = np.abs(means - usual) <= (resolution + 0.5 * usual) / window
@@ -165,7 +168,7 @@ def _numbered(time: Column, period: float, resolution: float) -> Column:
     ahead[count - tail :] = ahead[count - tail - 1]  # too near the end to tell late from lost
     lost, level = np.zeros(count), float(ahead[0])
     for k in (np.flatnonzero(np.diff(ahead) > 0.0) + 1).tolist():
-        if ahead[k] - level > _LOSS:
+        if ahead[k] - level > _LOST_ROW_STEP_PERIODS:
             missing = max(1.0, round(float(ahead[k]) - level))
             lost[k] = missing
             level += missing
@@ -174,10 +177,10 @@ def _numbered(time: Column, period: float, resolution: float) -> Column:
 
 def _resolution(steps: Column) -> float:
     """Return the step of a coarse clock, s; 0 where the steps do not come in a few sizes."""
-    sizes = np.unique(np.round(steps / _ROUNDING))
-    if not 1 < len(sizes) <= _KINDS or sizes[-1] > _LONGEST:
+    sizes = np.unique(np.round(steps / _ROUNDING_S))
+    if not 1 < len(sizes) <= _COARSE_STEP_KINDS or sizes[-1] > _TICKS_MAX:
         return 0.0
-    return float(np.gcd.reduce(sizes.astype(np.int64))) * _ROUNDING
+    return float(np.gcd.reduce(sizes.astype(np.int64))) * _ROUNDING_S
 
 
 def _spread(time: Column) -> Column:

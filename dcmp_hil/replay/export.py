@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.replay.run import ReplayResult
 
 _INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V", "none": "voltage_V"}
-_APPLICATION = "dcmp-hil replay"
+_APPLICATION_ID = "dcmp-hil replay"
 
 
 def columns(result: ReplayResult) -> dict[str, NDArray[np.float64]]:
@@ -94,7 +94,7 @@ def write_rrd(result: ReplayResult, path: Path) -> None:
     try:
         with whole_file(path) as place:
             try:
-                write_series(place, _APPLICATION, recording.time - recording.time[0], plots)
+                write_series(place, _APPLICATION_ID, recording.time - recording.time[0], plots)
             except ConfigError as error:  # it names the file that takes the place of this one
                 raise ConfigError(str(error).replace(str(place), str(path))) from None
     except OSError as error:

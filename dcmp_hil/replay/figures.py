@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.replay.recording import Recording
     from dcmp_hil.replay.reference import ZeroPhase
 
-_NOTHING = 1e-12  # rad/s2: what rounding leaves of a constant
+_ROUNDING_RAD_S2 = 1e-12  # rad/s2: what rounding leaves of a constant
 
 
 class Estimates(NamedTuple):
@@ -144,4 +144,4 @@ def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float | None
     """Pearson's; None if one of the two does not change."""
     a, b = a - np.mean(a), b - np.mean(b)
     size = _rms(a) * _rms(b)
-    return float(np.mean(a * b) / size) if size > _NOTHING else None
+    return float(np.mean(a * b) / size) if size > _ROUNDING_RAD_S2 else None

@@ -13,11 +13,12 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-_HELD = 0.05  # share of empty cells from which an input was written less often than the position
-_LONGEST = 2  # rows, one behind the other
-_FAR = 20.0  # times the largest of the other rows
-_LARGE = 60.0  # V or N m: below it a short pulse can have been meant
-_FEW = 0.001  # share of rows
+_EMPTY_CELLS_SHARE_MIN = 0.05
+"""Share of empty cells from which an input was written less often than the position."""
+_PULSE_ROWS_MAX = 2  # rows, one behind the other
+_OUTLIER_RATIO = 20.0  # times the largest of the other rows
+_LARGE_INPUT = 60.0  # V or N m: below it a short pulse can have been meant
+_FEW_ROWS_SHARE = 0.001  # share of rows
 
 
 def held(values: Column, cells: Sequence[str], name: str, notes: list[str]) -> Column:
@@ -33,7 +34,7 @@ def held(values: Column, cells: Sequence[str], name: str, notes: list[str]) -> C
         Of the column, for `notes`, to which is added what was done.
     """
     empty = np.array([not cell for cell in cells])
-    if not _HELD * len(empty) < empty.sum() < len(empty):
+    if not _EMPTY_CELLS_SHARE_MIN * len(empty) < empty.sum() < len(empty):
         return values
     last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(empty))))
     notes.append(
@@ -56,12 +57,12 @@ def undamaged(values: Column, size: float, name: str, notes: list[str]) -> Colum
     """
     amount = np.abs(size * values)
     known = np.sort(amount[np.isfinite(amount)])
-    others = known[: len(known) - max(1, int(_FEW * len(known)))]
+    others = known[: len(known) - max(1, int(_FEW_ROWS_SHARE * len(known)))]
     if not len(others):
         return values
-    far = amount > max(_LARGE, _FAR * float(others[-1]))
+    far = amount > max(_LARGE_INPUT, _OUTLIER_RATIO * float(others[-1]))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
-    if not len(edges) or int(np.max(edges[1::2] - edges[::2])) > _LONGEST:
+    if not len(edges) or int(np.max(edges[1::2] - edges[::2])) > _PULSE_ROWS_MAX:
         return values
     count = int(far.sum())
     what = "1 number is" if count == 1 else f"{count} numbers are"

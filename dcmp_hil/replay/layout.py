@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-_SAMPLED = 150  # lines that the layout is told from
+_SAMPLE_LINES = 150  # lines that the layout is told from
 HALF = 0.5
 COMMENT = re.compile(r"\s*(?:#+|%+|//+|;+(?=\s*[A-Za-z#]))\s*")
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
@@ -60,7 +60,7 @@ def prepared(lines: Sequence[str]) -> tuple[list[tuple[int, str]], str]:
             forced = separator[1]
             continue
         kept.append((number, text))
-    stamped = [_MONITOR.match(text) for _, text in kept[: _SAMPLED * 2]]
+    stamped = [_MONITOR.match(text) for _, text in kept[: _SAMPLE_LINES * 2]]
     if sum(map(bool, stamped)) > HALF * len(stamped):
         kept = [(number, _unstamped(text)) for number, text in kept]
     return kept, forced
@@ -104,10 +104,10 @@ def find_layout(path: Path, lines: Sequence[str], forced: str) -> Layout:
     ConfigError
         If no layout finds a row of numbers.
     """
-    step = max(1, len(lines) // _SAMPLED)
+    step = max(1, len(lines) // _SAMPLE_LINES)
     # The end of a file is sampled more densely than its beginning, which may be a long preamble.
     sample = [text for text in lines[len(lines) // 5 :: step] if not COMMENT.match(text)] or list(lines)
-    if len(lines) < _SAMPLED:
+    if len(lines) < _SAMPLE_LINES:
         sample = [text for text in lines if not COMMENT.match(text)]
     found = [
         rated
@@ -162,7 +162,7 @@ def comma_pairs(
     width = layout.width
     named = any(
         len(fields := split(text, ",")) == width // 2 and not any(is_value(name, ".") for name in fields)
-        for _, text in lines[:_SAMPLED]
+        for _, text in lines[:_SAMPLE_LINES]
     )
     if layout.delimiter != "," or width % 2 or not named:
         return None

@@ -53,7 +53,7 @@ _WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds
 _NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
 _NAMES_SHOWN = 30
 _NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
-_UNSURE = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
+_AMBIGUOUS_NAMES = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
 
 def _words(text: str) -> frozenset[str]:
@@ -66,15 +66,15 @@ _PLAIN = _words("""measured meas mes actual act real fb feedback applied given r
     motor joint pendulum arm shaft output encoder angle angular""")
 _COMMAND = _words("command commanded cmd desired des demand demanded sent control ctrl")
 _DRIVE = _words("drive input amp amplifier")
-_OTHER = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered filt
-    limit min max std constant offset index id acceleration accel acc current temperature temp
+_OTHER_WORDS = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered
+    filt limit min max std constant offset index id acceleration accel acc current temperature temp
     bus supply battery dc""")
 _ALL_NAMES = frozenset(word for words in _NAMES.values() for word in words)
 _DESCRIBING = (
     _PLAIN
     | _COMMAND
     | _DRIVE
-    | _OTHER
+    | _OTHER_WORDS
     | _ALL_NAMES
     | frozenset(_NO_UNIT)
     | _words("""unwrapped
@@ -82,7 +82,7 @@ _DESCRIBING = (
 )
 
 
-_WHY = {
+_AMBIGUITY_REASONS = {
     "option": "by option",
     "name": "by its name",
     "units": "by the file",
@@ -116,7 +116,7 @@ class Match(NamedTuple):
 
     def __str__(self) -> str:
         """Return the match as one line of text."""
-        why = _WHY[self.source]
+        why = _AMBIGUITY_REASONS[self.source]
         return f'{self.quantity}: column "{self.column}" in {self.unit} ({why})'
 
 
@@ -244,11 +244,11 @@ def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
     if " ".join(words) in _WHOLE:
         return (1, 99) if _WHOLE[" ".join(words)] == quantity else None
     words = [_without_number(quantity, word) for word in words]
-    names = [word for word in words if word in _NAMES[quantity] and (unit or word not in _UNSURE)]
+    names = [word for word in words if word in _NAMES[quantity] and (unit or word not in _AMBIGUOUS_NAMES)]
     if not names and unit and words and quantity != "time" and _PLAIN.union(_DRIVE).issuperset(words):
         return (4, 0)  # such as motor_V
     rest = [word for word in words if word not in names[:1]]
-    if not names or _OTHER.intersection(words) or any(_says_other(quantity, word) for word in rest):
+    if not names or _OTHER_WORDS.intersection(words) or any(_says_other(quantity, word) for word in rest):
         return None
     order = _NAMES[quantity].index(names[0])
     if _COMMAND.intersection(words):

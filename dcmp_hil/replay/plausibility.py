@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from dcmp_hil.replay.recording import Recording
     from dcmp_hil.replay.reference import ZeroPhase
 
-_FASTEST = 2000.0  # rad/s, 19,000 rpm
-_HOPELESS = 3.0  # times the motion itself: no observer that follows it is so far off
-_LARGE = 20.0  # rad/s
-_FIERCE = 5.0  # times the largest accelerations that input and gravity explain
-_GRAVITY = 50.0  # rad/s2, of an arm of 0.2 m
+_SPEED_MAX_RAD_S = 2000.0  # rad/s, 19,000 rpm
+_ERROR_RATIO_MAX = 3.0  # times the motion itself: no observer that follows it is so far off
+_LARGE_SPEED_RAD_S = 20.0  # rad/s
+_ACCELERATION_RATIO_MAX = 5.0  # times the largest accelerations that input and gravity explain
+_GRAVITY_MAX_RAD_S2 = 50.0  # rad/s2, of an arm of 0.2 m
 
 
 def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.bool_]) -> None:
@@ -31,7 +31,7 @@ def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.
         With the options that say what the columns are.
     """
     fastest = float(np.max(np.abs(reference.velocity[judged])))
-    if fastest > _FASTEST:
+    if fastest > _SPEED_MAX_RAD_S:
         raise ConfigError(
             f"{recording.name}: by this recording the arm turns at {fastest:.4g} rad/s "
             f"({fastest * 60.0 / (2.0 * np.pi):.4g} rpm), which cannot be. Check the units (--position-unit, "
@@ -63,7 +63,7 @@ def check_assumed(
     unexplained, explained = (
         float(np.sqrt(np.mean(np.square(values[judged])))) for values in (reference.disturbance, pushed)
     )
-    if unexplained > _FIERCE * (explained + _GRAVITY):
+    if unexplained > _ACCELERATION_RATIO_MAX * (explained + _GRAVITY_MAX_RAD_S2):
         raise ConfigError(
             f'{recording.name}: nothing says the unit of the position "{position.column}". In rad its motion '
             f"would need {unexplained:.3g} rad/s2 that neither input nor gravity explains. Say the unit: "
@@ -84,7 +84,7 @@ def check_estimates(
     truth = reference.velocity[judged]
     error = float(np.sqrt(np.mean(np.square(estimates.velocity[judged] - truth))))
     motion = float(np.sqrt(np.mean(np.square(truth))))
-    if error > max(_LARGE, _HOPELESS * motion):
+    if error > max(_LARGE_SPEED_RAD_S, _ERROR_RATIO_MAX * motion):
         raise ConfigError(
             f"{recording.name}: a velocity error of {error:.4g} rad/s RMS, in a motion of {motion:.4g} rad/s "
             "RMS, is no figure of an observer. Check the units (--position-unit, --counts-per-rev, "

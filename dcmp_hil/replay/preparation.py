@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.replay.recording import Recording
 
-_SHORTEST = 1e-6  # s: a shorter period is a wrong unit
+_PERIOD_MIN_S = 1e-6  # s: a shorter period is a wrong unit
 _USUAL_COUNTS = 4096.0  # where the recording tells nothing
 _PAPER_M = 1000.0  # rad/s3
 
@@ -97,7 +97,7 @@ def _period(recording: Recording, settings: ReplaySettings) -> float:
     if settings.period is not None:
         return settings.period
     period = float(np.median(np.diff(recording.time)))
-    if period < _SHORTEST:
+    if period < _PERIOD_MIN_S:
         raise ConfigError(
             f"{recording.name}: a usual step of {period:g} s is too short to be one. "
             "Check the time column and its unit (--time, --time-unit)."

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _TURN = 2.0 * np.pi
 _MOST_SHOWN = 5
 _HALF = 0.5
-_LARGEST = 1e12  # in any unit: beyond it a number is an overflow
+_VALUE_MAX = 1e12  # in any unit: beyond it a number is an overflow
 _WHOLE_RADIANS = 50.0  # a span of whole numbers that no recording in rad has
 
 
@@ -125,7 +125,7 @@ def _numbers(
 def _column(table: Table, column: Match) -> Column:
     values = numbers(table.column(column.column), table.decimal)
     with np.errstate(invalid="ignore"):
-        return np.where(np.abs(values) < _LARGEST, values, np.nan)
+        return np.where(np.abs(values) < _VALUE_MAX, values, np.nan)
 
 
 def _time(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.replay.turns import Modulus
 
 _FEWEST_ROWS = 20
-_LARGEST = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong
+_VALUE_MAX = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ class Recording:
     def _unbelievable(self, name: str, values: NDArray[np.float64]) -> str:
         if name == "velocity":  # nothing depends on it
             values = np.nan_to_num(values)
-        limit = np.inf if name == "time" else _LARGEST
+        limit = np.inf if name == "time" else _VALUE_MAX
         bad = np.flatnonzero(~(np.isfinite(values) & (np.abs(values) <= limit)))
         if not len(bad):
             return ""

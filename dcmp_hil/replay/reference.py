@@ -12,10 +12,11 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_ORDER = 3
-_FASTEST = 0.45  # cycles a sample: below 0.5 by more than the steps of a grid differ from the period
-_PADDING = 2.0  # periods of the corner: what the slowest pole leaves after them is 0.2 %
-_LEAST_PADDING = 4 * _ORDER  # samples, what scipy takes
+_FILTER_ORDER = 3
+_FREQUENCY_MAX_PER_SAMPLE = 0.45
+"""Cycles per sample: below 0.5 by more than the steps of a grid differ from the period."""
+_PADDING_PERIODS = 2.0  # periods of the corner: what the slowest pole leaves after them is 0.2 %
+_LEAST_PADDING = 4 * _FILTER_ORDER  # samples, what scipy takes
 
 
 class ZeroPhase(NamedTuple):
@@ -72,10 +73,11 @@ def zero_phase(
     ConfigError
         If scipy is missing, or the sampling is too slow for the corner.
     """
-    if cutoff * period > _FASTEST:
+    if cutoff * period > _FREQUENCY_MAX_PER_SAMPLE:
         raise ConfigError(
             f"A usual step of {period:g} s ({1.0 / period:.4g} Hz) is too slow for a reference of {cutoff:g} "
-            f"Hz, which needs {cutoff / _FASTEST:.3g} Hz. Check --time-unit, or lower --cutoff."
+            f"Hz, which needs {cutoff / _FREQUENCY_MAX_PER_SAMPLE:.3g} Hz. Check --time-unit, or lower "
+            "--cutoff."
         )
     velocity, disturbance = np.full(len(time), np.nan), np.full(len(time), np.nan)
     for first, last in pairwise([*np.flatnonzero(begins).tolist(), len(time)]):
@@ -85,7 +87,7 @@ def zero_phase(
         grid = _even(time[rows], period)
         if len(grid) <= _LEAST_PADDING:
             continue
-        pad = min(len(grid) - 1, max(_LEAST_PADDING, round(_PADDING / (cutoff * period))))
+        pad = min(len(grid) - 1, max(_LEAST_PADDING, round(_PADDING_PERIODS / (cutoff * period))))
         smooth, u = (
             _both_ways(np.interp(grid, time[rows], values), cutoff * (grid[1] - grid[0]), pad)
             for values in (position[rows], around)
@@ -107,5 +109,5 @@ def _both_ways(values: NDArray[np.float64], corner: float, pad: int) -> NDArray[
         from scipy.signal import butter, sosfiltfilt
     except ImportError:
         raise ConfigError("The zero-phase reference needs scipy. Install it: pip install scipy") from None
-    sections = butter(_ORDER, corner, fs=1.0, output="sos")
+    sections = butter(_FILTER_ORDER, corner, fs=1.0, output="sos")
     return np.asarray(sosfiltfilt(sections, values, padlen=pad), dtype=np.float64)

@@ -9,12 +9,12 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_SMALLEST = 1e-9  # rad: below it lies the rounding of arithmetic, not an encoder
-_TRIES = 50
-_MULTIPLES = 20  # counts: in longer steps a small error of the candidate hides every fraction
-_FEWEST = 10  # steps to judge a candidate by
-_FITTING = 0.95  # of the steps; a few may be glitches
-_MISFIT = 0.15  # counts; 30 % of random steps would pass
+_STEP_MIN_RAD = 1e-9  # rad: below it lies the rounding of arithmetic, not an encoder
+_CANDIDATES_MAX = 50
+_STEP_MAX_COUNTS = 20  # counts: in longer steps a small error of the candidate hides every fraction
+_STEPS_MIN = 10  # steps to judge a candidate by
+_FITTING_STEPS_SHARE_MIN = 0.95  # of the steps; a few may be glitches
+_MISFIT_MAX_COUNTS = 0.15  # counts; 30 % of random steps would pass
 
 _TURN = 2.0 * np.pi
 _MOST_COUNTS = 2.0**24
@@ -39,17 +39,17 @@ def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
         that hardly moved).
     """
     steps = np.sort(np.abs(np.diff(position)))
-    steps = steps[steps > _SMALLEST]
+    steps = steps[steps > _STEP_MIN_RAD]
     candidate = 0.0
-    for _ in range(_TRIES):
+    for _ in range(_CANDIDATES_MAX):
         larger = steps[np.searchsorted(steps, 1.02 * candidate) :]
-        if len(larger) < _FEWEST:
+        if len(larger) < _STEPS_MIN:
             return None
         candidate = float(larger[0])
-        short = steps[(steps > 0.5 * candidate) & (steps < (_MULTIPLES + 0.5) * candidate)]
+        short = steps[(steps > 0.5 * candidate) & (steps < (_STEP_MAX_COUNTS + 0.5) * candidate)]
         multiples = np.round(short / candidate)
-        fits = np.abs(short / candidate - multiples) < _MISFIT
-        if len(short) >= _FEWEST and np.mean(fits) >= _FITTING:
+        fits = np.abs(short / candidate - multiples) < _MISFIT_MAX_COUNTS
+        if len(short) >= _STEPS_MIN and np.mean(fits) >= _FITTING_STEPS_SHARE_MIN:
             return float(_TURN / np.median(short[fits] / multiples[fits]))
     return None
 

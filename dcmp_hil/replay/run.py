@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from dcmp_hil.replay.recording import Recording
 
 _LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
-_ROUNDING = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
-_RUNAWAY = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
+_ROUNDING_S = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
+_ESTIMATE_MAX = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +91,7 @@ def replay(recording: Recording, settings: ReplaySettings | None = None) -> Repl
         begins=begins,
         cutoff=settings.cutoff,
     )
-    settled = _since_restart(recording.time, begins) > settings.start + _ROUNDING
+    settled = _since_restart(recording.time, begins) > settings.start + _ROUNDING_S
     judged = settled & np.isfinite(reference.velocity)
     if not judged.any():
         raise ConfigError(
@@ -136,7 +136,7 @@ def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64],
     samples = zip(elapsed.tolist(), recording.position.tolist(), voltage.tolist(), strict=True)
     for k, (t, position, applied) in enumerate(samples):
         rows[k] = observer.update(Sample(t, position, applied))
-    away = np.flatnonzero(~(np.abs(rows) < _RUNAWAY).all(axis=1))
+    away = np.flatnonzero(~(np.abs(rows) < _ESTIMATE_MAX).all(axis=1))
     if len(away):
         failure = failure_of(observer)
         if failure is not None and failure.reason == "plugin":

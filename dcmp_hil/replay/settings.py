@@ -12,7 +12,7 @@ from dcmp_hil.errors import ConfigError
 
 InputKind = Literal["torque", "voltage", "none"]
 _PAPER = Model()
-_HERE = Path()
+_CURRENT_FOLDER = Path()
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
 
@@ -31,7 +31,7 @@ class ReplaySettings:
     """`super_twisting` (R1), `paper` (R0), or `module:Class`, made as Class(context, **observer_options)."""
     observer_options: dict[str, Any] = field(default_factory=dict)
     """What `module:Class` is made with, by keyword."""
-    folders: tuple[Path, ...] = (_HERE,)
+    folders: tuple[Path, ...] = (_CURRENT_FOLDER,)
     """Where its module is looked for beside what is installed."""
     from_zero: bool = False
     """Whether the paper's observer begins at 0, as in the paper, and not at the first position."""

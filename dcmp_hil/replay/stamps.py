@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
 
 _NEAR_END = 20.0  # usual steps: so close to its ends a counter is when it wraps
-_GAP = 10.0  # usual steps; after a longer one the observer restarts anyway
+_GAP_STEPS_MIN = 10.0  # usual steps; after a longer one the observer restarts anyway
 _COUNTERS = tuple(2.0**bits for bits in (8, 16, 24, 31, 32))
 _TICKS = (1e-9, 1e-6, 1e-3)  # s: of a 32-bit counter that the file gives in another unit
 _CLOCKS = (60.0, 3600.0, 43_200.0, 86_400.0, 604_800.0)  # s: seconds of the minute ... of the week
-_FEW = 0.05  # share of rows
+_FEW_ROWS_SHARE = 0.05  # share of rows
 _DAYS = ((2e4, 8e4), (7e5, 8e5))  # since 1900, since the year 0: from 1954 on
-_SHORTEST = 1e-5  # of a day: 0.9 s
+_DAY_FRACTION_STEP_MAX = 1e-5  # of a day: 0.9 s
 _EPOCHS = ((1e11, 1e14, "ms", 1e-3), (1e14, 1e17, "us", 1e-6), (1e17, 1e20, "ns", 1e-9))
 
 
@@ -55,7 +55,7 @@ def epoch_unit(raw: Column) -> tuple[str, float] | None:
     """
     middle = float(np.median(raw))
     step = float(np.median(np.abs(np.diff(raw)))) if len(raw) > 1 else 1.0
-    if any(low < middle < high for low, high in _DAYS) and 0.0 < step < _SHORTEST:
+    if any(low < middle < high for low, high in _DAYS) and 0.0 < step < _DAY_FRACTION_STEP_MAX:
         return "days", 86_400.0
     return next(((name, size) for low, high, name, size in _EPOCHS if low < middle < high), None)
 
@@ -103,13 +103,13 @@ def rising(raw: Column, size: float, copies: NDArray[np.bool_], period: float | 
     raw = _unwrapped(raw, size, usual, notes)
     doubled = copies & np.concatenate(([False], np.diff(raw) == 0.0))
     repeated = int(np.count_nonzero(np.diff(raw) == 0.0))
-    if doubled.any() and (doubled.sum() == repeated or repeated < _FEW * len(raw)):
+    if doubled.any() and (doubled.sum() == repeated or repeated < _FEW_ROWS_SHARE * len(raw)):
         rows, raw = rows[~doubled], raw[~doubled]
         notes.append(f"{_rows(int(doubled.sum()))} left out that the file holds twice.")
-    if np.count_nonzero(np.diff(raw) <= 0.0) < _FEW * len(raw):
+    if np.count_nonzero(np.diff(raw) <= 0.0) < _FEW_ROWS_SHARE * len(raw):
         raw, rows = _in_order(raw, rows, usual, notes)
     starts = _starts(raw, size, usual, notes)
-    if len(starts) > _FEW * len(raw):
+    if len(starts) > _FEW_ROWS_SHARE * len(raw):
         raise ConfigError(
             f"{name}: the time goes back in {len(starts)} of {len(raw)} rows, so it does not tell when they "
             f"were taken. If they are evenly sampled, say so: --period {period or 'T'} --time none."
@@ -153,7 +153,7 @@ def _unwrapped(raw: Column, size: float, usual: float, notes: list[str]) -> Colu
             unsigned = before > modulus - near and 0.0 <= after < near
             signed = before > 0.5 * modulus - near and after < near - 0.5 * modulus
             step = after + modulus - before
-            if (unsigned or signed) and 0.0 < step <= _GAP * usual:
+            if (unsigned or signed) and 0.0 < step <= _GAP_STEPS_MIN * usual:
                 lift[k:] += modulus
                 found, counts = name, counts + 1
                 break

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 Line = tuple[int, str]  # its number in the file, from 1, and its text
 
-_SHOWN = 50  # characters of a line in a message
-_RECENT = 500  # rows at the end that a broken number is compared with
-_RARE = 0.01  # share of rows
-_BENT = 2.0  # times the sharpest bend of those rows
+_SHOWN_CHARS_MAX = 50  # characters of a line in a message
+_COMPARED_ROWS = 500  # rows at the end that a broken number is compared with
+_RARE_ROWS_SHARE = 0.01  # share of rows
+_BEND_RATIO_MAX = 2.0  # times the sharpest bend of those rows
 
 
 class Table(NamedTuple):
@@ -209,13 +209,13 @@ def _torn(rows: list[list[str]], source: Lines, decimal: str) -> bool:
         return False
     cells = [row[-1] for row in rows]
     decimals = [len(re.split("[.,]", cell)[-1]) if re.search("[.,]", cell) else 0 for cell in cells]
-    rare = sum(shown <= decimals[-1] for shown in decimals[:-1]) < _RARE * len(decimals)
+    rare = sum(shown <= decimals[-1] for shown in decimals[:-1]) < _RARE_ROWS_SHARE * len(decimals)
     if rare:
         return True
-    values = [number(cell, decimal) for cell in cells[-_RECENT:]]
+    values = [number(cell, decimal) for cell in cells[-_COMPARED_ROWS:]]
     bends = [abs(a - 2.0 * b + c) for a, b, c in zip(values, values[1:], values[2:], strict=False)]
     known = [bend for bend in bends[:-1] if not math.isnan(bend)]
-    return len(cells[-1]) < len(cells[-2]) and bool(known) and bends[-1] > _BENT * max(known)
+    return len(cells[-1]) < len(cells[-2]) and bool(known) and bends[-1] > _BEND_RATIO_MAX * max(known)
 
 
 def _aligned(
@@ -253,4 +253,4 @@ def _lines(count: int) -> str:
 
 def _shown(line: Line) -> str:
     text = "".join(sign if sign.isprintable() else " " for sign in line[1]).strip()
-    return '"' + (text if len(text) <= _SHOWN else text[:_SHOWN] + "...") + '"'
+    return '"' + (text if len(text) <= _SHOWN_CHARS_MAX else text[:_SHOWN_CHARS_MAX] + "...") + '"'

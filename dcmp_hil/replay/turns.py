@@ -20,14 +20,15 @@ _TURN = 2.0 * np.pi
 _BITS = (8, 10, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 32)
 _TURNS = (1.0, 2.0, 4.0)
 _HALF = 0.5
-_SHARP = 0.25  # of the modulus: so much no step differs from the two before it once the wraps are undone
-_JUMP = 0.5  # rad between two rows, more than the rows around it move
-_ACCELERATION = 2e4  # rad/s2: above it there is no arm
-_AROUND = 3  # rows on either side that a step is compared with
+_STEP_CHANGE_MAX_TURNS = 0.25
+"""Of the modulus: so much no step differs from the two before it once the wraps are undone."""
+_JUMP_MIN_RAD = 0.5  # rad between two rows, more than the rows around it move
+_ACCELERATION_MAX_RAD_S2 = 2e4  # rad/s2: above it there is no arm
+_NEIGHBOUR_ROWS = 3  # rows on either side that a step is compared with
 _LONGEST_SPIKE = 3  # rows
-_FEW = 0.02  # share of rows
-_FEWEST = 3
-_SHORTEST = 3  # rows that have a step beside another one
+_FEW_ROWS_SHARE = 0.02  # share of rows
+_ODD_ROWS_MIN = 3
+_STRETCH_ROWS_MIN = 3  # rows that have a step beside another one
 
 Modulus = float | Literal["none"] | None
 
@@ -124,7 +125,7 @@ def continuous(
                 f"The position wraps at {what} in {_places(places)}: unwrapped. --modulus overrides it."
             )
         _check_half(np.diff(raw)[inside], chosen)
-    if len(raw) < _SHORTEST:
+    if len(raw) < _STRETCH_ROWS_MIN:
         return Motion(raw, np.ones(len(raw), dtype=bool), (), tuple(notes))
     keep, jumps = _impossible(size * raw, time, inside)
     if not keep.all():
@@ -151,7 +152,7 @@ def _found(raw: Column, steps: Column, inside: NDArray[np.bool_], known: dict[fl
         if not wraps[inside].any():
             continue
         undone = steps + modulus * wraps
-        sharp = np.abs(np.diff(undone)) > _SHARP * modulus
+        sharp = np.abs(np.diff(undone)) > _STEP_CHANGE_MAX_TURNS * modulus
         near = wraps[1:].astype(bool) | wraps[:-1].astype(bool)
         # Where a wrap was undone the motion must go on as before: then it was one.
         if np.mean(sharp[near]) < 0.1:  # noqa: PLR2004 - a glitch may lie beside a wrap
@@ -161,7 +162,7 @@ def _found(raw: Column, steps: Column, inside: NDArray[np.bool_], known: dict[fl
 
 def _check_half(steps: Column, modulus: float) -> None:
     sharp = np.abs(np.diff(steps)) > _HALF * modulus
-    if np.count_nonzero(sharp) > max(_FEWEST, 0.001 * len(steps)):
+    if np.count_nonzero(sharp) > max(_ODD_ROWS_MIN, 0.001 * len(steps)):
         raise ConfigError(
             f"The position moves by about half of its modulus ({modulus:.6g}) between two rows in "
             f"{np.count_nonzero(sharp)} places, so that nothing tells which way it went. Say --modulus if it "
@@ -176,7 +177,7 @@ def _impossible(
     dt = np.diff(time)
     rate = np.diff(position) / dt
     usual = np.median(dt)
-    jump = max(_JUMP, _ACCELERATION * float(usual) ** 2)
+    jump = max(_JUMP_MIN_RAD, _ACCELERATION_MAX_RAD_S2 * float(usual) ** 2)
     around = _running_median(rate)
     far = inside & (np.abs(rate - around) * dt > jump) & (dt < 3.0 * usual)
     keep = np.ones(len(position), dtype=bool)
@@ -205,14 +206,15 @@ def _returns(position: Column, first: int, last: int, jump: float) -> bool:
 
 
 def _running_median(values: Column) -> Column:
-    padded = np.pad(values, _AROUND, mode="edge")
+    padded = np.pad(values, _NEIGHBOUR_ROWS, mode="edge")
     return np.asarray(
-        np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _AROUND + 1), axis=1), dtype=np.float64
+        np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOUR_ROWS + 1), axis=1),
+        dtype=np.float64,
     )
 
 
 def _check_few(raw: Column, jumps: Sequence[int], sizes: Column, open_: bool) -> None:
-    if len(jumps) <= max(_FEWEST, _FEW * len(raw) / 10.0):
+    if len(jumps) <= max(_ODD_ROWS_MIN, _FEW_ROWS_SHARE * len(raw) / 10.0):
         return
     usual = float(np.median(np.abs(sizes)))
     alike = np.mean(np.abs(np.abs(sizes) - usual) < 0.2 * usual) > _HALF

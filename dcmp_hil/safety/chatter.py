@@ -20,15 +20,17 @@ if TYPE_CHECKING:
 
 FLOOR_V_S = 1000.0
 """V/s, below which nothing is chatter."""
-_TIMES = 10.0  # the expected variation, from which on it is chatter
+_VARIATION_RATIO_MAX = 10.0  # the expected variation, from which on it is chatter
 BLOCK = 0.05  # s, over which the variation is a mean
-_BLOCKS = 10  # half a second
-_GAP = 0.5  # of what is allowed: two blocks below it are a pause
-_BURST, _PAUSE, _BURSTS = 2, 1, 40  # blocks of bursts with pauses: how they count, up to when
-_FEWEST = 12  # samples that say anything
+_WINDOW_BLOCKS = 10  # half a second
+_PAUSE_SHARE_MAX = 0.5  # of what is allowed: two blocks below it are a pause
+_BURST_WEIGHT = 2  # of a block with chatter, in the score of bursts with pauses
+_PAUSE_WEIGHT = 1  # of a block without
+_BURST_SCORE_MAX = 40  # at which it is chatter
+_SAMPLES_MIN = 12  # samples that say anything
 _SWING_COUNTS, _SWING_RAD = 10.0, 5e-3  # of the arm, peak to peak
 _DRIFT, _LAGS = 3, 4  # order of what is no swing; periods from a count to the voltage that it makes
-_FOLLOWS = 0.5  # correlation
+_CORRELATION_MIN = 0.5  # correlation
 
 
 class Chatter:
@@ -55,7 +57,7 @@ class Chatter:
         self.block = max(1, round(BLOCK / period))
         self.samples: Collection[Sample] = ()
         self._count = count
-        self._rates: deque[float] = deque(maxlen=_BLOCKS + 1)  # V/s, of the newest blocks
+        self._rates: deque[float] = deque(maxlen=_WINDOW_BLOCKS + 1)  # V/s, of the newest blocks
         self._bursts = 0
         self._t = math.nan
         self._expected = self._limit = math.nan
@@ -74,12 +76,12 @@ class Chatter:
         if not gone > 0.0:  # the first
             return None
         self._rates.append(change / gone)
-        rates, quiet = list(self._rates), 2.0 * _GAP * self._limit
-        mean = sum(rates[-_BLOCKS:]) / _BLOCKS
+        rates, quiet = list(self._rates), 2.0 * _PAUSE_SHARE_MAX * self._limit
+        mean = sum(rates[-_WINDOW_BLOCKS:]) / _WINDOW_BLOCKS
         goes_on = mean >= self._limit and sum(rates[-2:]) >= quiet
-        self._bursts = self._bursts + _BURST if goes_on else max(0, self._bursts - _PAUSE)
-        steady = goes_on and len(rates) > _BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
-        return self._stop(t, mean) if steady or self._bursts >= _BURSTS else None
+        self._bursts = self._bursts + _BURST_WEIGHT if goes_on else max(0, self._bursts - _PAUSE_WEIGHT)
+        steady = goes_on and len(rates) > _WINDOW_BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
+        return self._stop(t, mean) if steady or self._bursts >= _BURST_SCORE_MAX else None
 
     def _stop(self, t: float, mean: float) -> Stop:
         said = (
@@ -98,7 +100,7 @@ class Chatter:
 
 def limit_V_s(expected: float) -> float:
     """Return the variation from which on it is chatter, V/s."""
-    return max(FLOOR_V_S, _TIMES * expected)
+    return max(FLOOR_V_S, _VARIATION_RATIO_MAX * expected)
 
 
 _CONTROLLER = (
@@ -125,7 +127,7 @@ def cause_of(samples: Collection[Sample], count: float) -> tuple[str, str]:
     count
         rad, one count of the encoder; 0 for an ideal one.
     """
-    if len(samples) < _FEWEST:
+    if len(samples) < _SAMPLES_MIN:
         return _CONTROLLER
     t, position, voltage, _ = np.array(list(samples), float).T
     if not (np.isfinite(t + position + voltage).all() and (np.diff(t) > 0.0).all()):
@@ -133,10 +135,10 @@ def cause_of(samples: Collection[Sample], count: float) -> tuple[str, str]:
     moved = position - np.polyval(np.polyfit(t - t[0], position, _DRIFT), t - t[0])
     change, step = np.diff(voltage), np.diff(position)
     smooth = min(_correlation(voltage[1:], voltage[:-1]), _correlation(step[1:], step[:-1]))
-    if smooth > _FOLLOWS and float(np.ptp(moved)) > max(_SWING_COUNTS * count, _SWING_RAD):
+    if smooth > _CORRELATION_MIN and float(np.ptp(moved)) > max(_SWING_COUNTS * count, _SWING_RAD):
         return _SWING
     follows = max(abs(_correlation(change[lag:], step[: len(step) - lag])) for lag in range(_LAGS))
-    return _ENCODER if follows > _FOLLOWS else _CONTROLLER
+    return _ENCODER if follows > _CORRELATION_MIN else _CONTROLLER
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

@@ -9,11 +9,11 @@ from dcmp_hil.stop import Stop, Urgency
 if TYPE_CHECKING:
     from dcmp_hil.values import Timing
 
-_LATE = 0.5  # of a period
-_WINDOW = 20  # periods
-_LEAK = 0.01  # of a period a period: no device's clock is further off than 1 %
-_WARM = 0.1  # s: the first periods find nothing in the caches, and the amplifier still at 0 V
-_MASK = (1 << _WINDOW) - 1
+_LATE_MIN_PERIODS = 0.5  # of a period
+_WINDOW_PERIODS = 20  # periods
+_LEAK_PERIODS = 0.01  # of a period a period: no device's clock is further off than 1 %
+_WARM_UP_S = 0.1  # s: the first periods find nothing in the caches, and the amplifier still at 0 V
+_WINDOW_MASK = (1 << _WINDOW_PERIODS) - 1
 
 
 class Overruns:
@@ -39,10 +39,10 @@ class Overruns:
     def __init__(self, period: float, limit: int | None = None) -> None:
         self.count = 0
         self._period, self._limit = period, limit
-        self._leak, self._late = _LEAK * period, _LATE * period
+        self._leak, self._late = _LEAK_PERIODS * period, _LATE_MIN_PERIODS * period
         self._punctual = 0.0  # s, lateness of the most punctual sample
         self._recent = 0  # a bit a period, the newest last
-        self._cold = round(_WARM / period)  # periods to go
+        self._cold = round(_WARM_UP_S / period)  # periods to go
 
     def check(self, timing: Timing) -> Stop | None:
         """Take the timing of one period; return why the run should end if too many were late."""
@@ -58,7 +58,7 @@ class Overruns:
             self.count += late
         elif late or self._recent:
             self.count += late
-            self._recent = recent = (self._recent << 1 | late) & _MASK
+            self._recent = recent = (self._recent << 1 | late) & _WINDOW_MASK
             if late and self._limit is not None and recent.bit_count() >= self._limit:
                 return self._too_many(timing)
         return None
@@ -67,8 +67,8 @@ class Overruns:
         behind = timing.lateness - self._punctual
         return Stop(
             "deadline",
-            f"{self._recent.bit_count()} of the last {_WINDOW} periods of {1e6 * self._period:.0f} us were "
-            f"late; the last sample by {1e6 * behind:.0f} us, its command took "
+            f"{self._recent.bit_count()} of the last {_WINDOW_PERIODS} periods of {1e6 * self._period:.0f} "
+            f"us were late; the last sample by {1e6 * behind:.0f} us, its command took "
             f"{1e6 * timing.compute:.0f} us.",
             "Close other programs, lower loop.rate_hz, see what the summary says was not granted, or set "
             'timing.overrun = "hold".',

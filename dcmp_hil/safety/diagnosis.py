@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-_WINDOW = 100e-3  # s
-_FEWEST, _MOST = 12, 64  # samples that say anything; that are looked at
+_WINDOW_S = 100e-3  # s
+_SAMPLES_MIN, _SAMPLES_MAX = 12, 64  # samples that say anything; that are looked at
 _ONSETS = 24  # instants in the window at which the fault may have begun
-_NOISE, _LEAST = 0.4, 2e-4  # counts and rad: of a position, quantised and modelled
-_START = (10.0, 10.0, 5.0)  # rad, rad/s, rad/s2: what position, velocity and friction may be
-_GAIN, _DEAD, _PUSH = 0.25, 0.15, 100.0  # of a motor's gain, of a dead one's; rad/s2, of a push
+_NOISE_COUNTS, _NOISE_MIN_RAD = 0.4, 2e-4  # counts and rad: of a position, quantised and modelled
+_START_DEVIATIONS = (10.0, 10.0, 5.0)  # rad, rad/s, rad/s2: what position, velocity and friction may be
+_GAIN_DEVIATION = 0.25  # of a motor's gain
+_DEAD_MOTOR_GAIN_DEVIATION = 0.15  # of a dead motor's gain
+_PUSH_DEVIATION_RAD_S2 = 100.0  # of a push
 
 
 class Finding(NamedTuple):
@@ -49,7 +51,7 @@ _POLARITY = Finding(
     "The motor pushes the arm the wrong way",
     "Look at the polarity of motor and encoder: amplifier.sign, encoder.sign.",
 )
-_OTHER = Finding(
+_OTHER_CAUSE = Finding(
     "disturbance",
     "Something pushes the arm that the model does not know",
     "Look for an obstacle, at the load and [model], and that the voltage fed back is the one really applied.",
@@ -74,8 +76,8 @@ class Diagnosis:
 
     def __init__(self, setting: ObserverContext) -> None:
         self._model, counts = setting.model, setting.counts_per_rev
-        self._noise = math.hypot(_NOISE * (math.tau / counts if counts else 0.0), _LEAST)
-        self._seen: deque[Sample] = deque(maxlen=max(_FEWEST, round(_WINDOW / setting.period)))
+        self._noise = math.hypot(_NOISE_COUNTS * (math.tau / counts if counts else 0.0), _NOISE_MIN_RAD)
+        self._seen: deque[Sample] = deque(maxlen=max(_SAMPLES_MIN, round(_WINDOW_S / setting.period)))
         self.add = self._seen.append
         """Remember a sample; called every period, so there is no function around it."""
 
@@ -86,35 +88,39 @@ class Diagnosis:
 
     def finding(self) -> Finding:
         """Return the likely cause, judged by the last samples."""
-        if len(self._seen) < _FEWEST:
-            return _OTHER
+        if len(self._seen) < _SAMPLES_MIN:
+            return _OTHER_CAUSE
         t, position, voltage, _ = np.array(self._seen, float).T
         if not (np.isfinite(t + position + voltage).all() and (np.diff(t) > 0.0).all()):
-            return _OTHER
+            return _OTHER_CAUSE
         return max(self._causes(t - t[0], position, voltage), key=lambda found: found[1])[0]
 
     def _causes(self, t: Vector, position: Vector, voltage: Vector) -> Iterator[tuple[Finding, float]]:
         """Yield each cause with the logarithm of its probability, up to a constant."""
-        shown = np.unique(np.linspace(0, len(t) - 1, _MOST).astype(int))
+        shown = np.unique(np.linspace(0, len(t) - 1, _SAMPLES_MAX).astype(int))
         judge = _Judge(t, shown, self._noise)
         driven = self._model.ku * voltage
         fallen = -self._model.gravity * np.sin(position)
         expected = position - moved_by(t, driven + fallen)
         found: dict[str, list[float]] = {"other": [], "power": [], "motor": [], "encoder": [], "stuck": []}
-        for onset in np.unique(np.linspace(0, len(t) - _FEWEST // 2, _ONSETS).astype(int)):
+        for onset in np.unique(np.linspace(0, len(t) - _SAMPLES_MIN // 2, _ONSETS).astype(int)):
             after = np.arange(len(t)) > onset
             late, early = moved_by(t, driven * after), moved_by(t, driven * ~after)
             push = moved_by(t, after.astype(float))
             mirrored = np.where(after, 2.0 * position[onset] - position, position)
             turned = mirrored - moved_by(t, driven - self._model.gravity * np.sin(mirrored))
-            found["other"].append(judge.weigh(expected, (early + late, _GAIN), (push, _PUSH)))
-            found["power"].append(judge.weigh(expected + late, (early, _GAIN), (late, _DEAD)))
-            found["motor"].append(judge.weigh(expected + 2.0 * late, (early - late, _GAIN)))
-            found["encoder"].append(judge.weigh(turned, (early + late, _GAIN)))
+            found["other"].append(
+                judge.weigh(expected, (early + late, _GAIN_DEVIATION), (push, _PUSH_DEVIATION_RAD_S2))
+            )
+            found["power"].append(
+                judge.weigh(expected + late, (early, _GAIN_DEVIATION), (late, _DEAD_MOTOR_GAIN_DEVIATION))
+            )
+            found["motor"].append(judge.weigh(expected + 2.0 * late, (early - late, _GAIN_DEVIATION)))
+            found["encoder"].append(judge.weigh(turned, (early + late, _GAIN_DEVIATION)))
             found["stuck"].append(judge.weigh_stuck(expected, position, int(onset)))
         reasons = {"power": _POWER, "motor": _POLARITY, "encoder": _POLARITY, "stuck": _STUCK}
         for name, logs in found.items():
-            yield reasons.get(name, _OTHER), float(np.logaddexp.reduce(logs))
+            yield reasons.get(name, _OTHER_CAUSE), float(np.logaddexp.reduce(logs))
 
 
 def moved_by(t: Vector, acceleration: Vector) -> Vector:
@@ -140,7 +146,7 @@ class _Judge:
 
     def __init__(self, t: Vector, shown: NDArray[np.intp], noise: float) -> None:
         self._shown, self._noise = shown, noise
-        start = np.column_stack([np.ones_like(t), t, 0.5 * t * t])[shown] * _START
+        start = np.column_stack([np.ones_like(t), t, 0.5 * t * t])[shown] * _START_DEVIATIONS
         covariance = start @ start.T + noise * noise * np.eye(len(shown))
         self._root = np.linalg.cholesky(covariance)
         self._white = np.linalg.inv(self._root)  # of the first n rows, for the first n samples as well

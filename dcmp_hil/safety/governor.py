@@ -11,15 +11,18 @@ from typing import NamedTuple
 
 from dcmp_hil.values import Reference
 
-_STOPPING = 0.7  # of the acceleration, that a stop reckons with: what it takes to begin one is the rest
-_LEADING = 0.8  # of the acceleration, between stops
-_EASY = 0.5  # of the acceleration, that the way to a position is laid out for
-_PULL, _DAMPING = 5.0, 15.0  # 1/s, of a small distance; of the velocity
-_LAG = 0.02  # s, over which its own acceleration changes: the voltage has no steps from it
-_MET = Reference(5e-4, 0.02, 2.0)  # rad, rad/s, rad/s2: so close it goes over into the reference
-_JUMP, _OVERSHOOT, _STRONGER = 2.0, 0.4, 1.5  # rad; of a jump; times the believed motor
+_BRAKING_ACCELERATION_SHARE = 0.7
+"""Of the acceleration, that a stop reckons with: what it takes to begin one is the rest."""
+_MOVING_ACCELERATION_SHARE = 0.8  # of the acceleration, between stops
+_APPROACH_ACCELERATION_SHARE = 0.5  # of the acceleration, that the way to a position is laid out for
+_PULL_1_S, _DAMPING_1_S = 5.0, 15.0  # 1/s, of a small distance; of the velocity
+_ACCELERATION_LAG_S = 0.02  # s, over which its own acceleration changes: the voltage has no steps from it
+_JOIN_TOLERANCE = Reference(5e-4, 0.02, 2.0)  # rad, rad/s, rad/s2: so close it goes over into the reference
+_JUMP_MAX_RAD = 2.0  # larger jumps are governed
+_OVERSHOOT_SHARE = 0.4  # of a jump
+_MOTOR_GAIN_RATIO_MAX = 1.5  # times the believed motor gain
 _BETWEEN_JUMPS = 0.5  # s
-_LONGEST, _STEP = 0.1, 2e-3  # s
+_GAP_MAX_S, _INTEGRATION_STEP_S = 0.1, 2e-3  # s
 
 
 class Bounds(NamedTuple):
@@ -35,8 +38,12 @@ class Bounds(NamedTuple):
         """Return whether a jump to `target` (rad) over `distance` may be left to the controller."""
         size = abs(distance)
         known = math.isfinite(self.strongest)  # else it is a simulation without a limit
-        fastest = math.sqrt(_STRONGER * self.strongest * size) if known else 0.0
-        return size <= _JUMP and abs(target) + _OVERSHOOT * size <= self.position and fastest <= self.velocity
+        fastest = math.sqrt(_MOTOR_GAIN_RATIO_MAX * self.strongest * size) if known else 0.0
+        return (
+            size <= _JUMP_MAX_RAD
+            and abs(target) + _OVERSHOOT_SHARE * size <= self.position
+            and fastest <= self.velocity
+        )
 
 
 class Governor:
@@ -58,7 +65,7 @@ class Governor:
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
         self._x, self._v, self._a, self._own, _ = bounds
-        self._stop = 0.5 / (_STOPPING * bounds.braking)
+        self._stop = 0.5 / (_BRAKING_ACCELERATION_SHARE * bounds.braking)
         self._t = self._jumped = -math.inf
         self.last = Reference(math.nan, 0.0, 0.0)
         self.leads = False
@@ -101,14 +108,14 @@ class Governor:
 
     def _led(self, dt: float, reference: Reference) -> Reference:
         """Move on in steps of a few milliseconds, however long the period was."""
-        dt = min(dt, _LONGEST)
+        dt = min(dt, _GAP_MAX_S)
         if not math.isfinite(sum(reference)):
             return reference
         if self._met(reference):
             self.leads = False
             self.last = reference
             return reference
-        steps = max(1, math.ceil(dt / _STEP))
+        steps = max(1, math.ceil(dt / _INTEGRATION_STEP_S))
         for _ in range(steps):
             self.last = self._lead(dt / steps, reference)
         return self.last
@@ -120,7 +127,7 @@ class Governor:
         if not (abs(target) <= self._x and abs(speed) <= self._v and abs(push) <= self._a):
             target, speed, push = min(max(target, -self._x), self._x), 0.0, 0.0
         wanted = self._wanted(x, v, target, speed, push)
-        smooth = math.exp(-dt / _LAG)
+        smooth = math.exp(-dt / _ACCELERATION_LAG_S)
         a = wanted + smooth * (a - wanted)
         x, v = x + dt * (v + 0.5 * dt * a), v + dt * a
         if abs(v) > self._v:
@@ -133,17 +140,21 @@ class Governor:
         """Return the acceleration to aim at, rad/s2."""
         if not -self._x < x + self._stop * v * abs(v) < self._x and x * v >= 0.0 and v != 0.0:
             return math.copysign(self._own, -v)
-        easy, most = _EASY * self._own, _LEADING * self._own
+        easy, most = _APPROACH_ACCELERATION_SHARE * self._own, _MOVING_ACCELERATION_SHARE * self._own
         left = target - x
-        near = easy / _PULL**2
-        way = _PULL * left
+        near = easy / _PULL_1_S**2
+        way = _PULL_1_S * left
         if abs(left) > near:
             way = math.copysign(math.sqrt(2.0 * easy * (abs(left) - 0.5 * near)), left)
-        way = min(max(way + speed, -_LEADING * self._v), _LEADING * self._v)
-        return min(max(push + _DAMPING * (way - v), -most), most)
+        way = min(
+            max(way + speed, -_MOVING_ACCELERATION_SHARE * self._v), _MOVING_ACCELERATION_SHARE * self._v
+        )
+        return min(max(push + _DAMPING_1_S * (way - v), -most), most)
 
     def _met(self, reference: Reference) -> bool:
         x, v, a = reference
-        near = all(abs(is_ - own) <= met for is_, own, met in zip(reference, self.last, _MET, strict=True))
+        near = all(
+            abs(is_ - own) <= met for is_, own, met in zip(reference, self.last, _JOIN_TOLERANCE, strict=True)
+        )
         inside = abs(x) <= self._x and abs(v) <= self._v and abs(a) <= self._a
         return near and inside and abs(x + self._stop * v * abs(v)) <= self._x

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample
 
 _SAID_EVERY = 1.0  # s, each limit
-_SATURATED = 0.5  # s in a row at a limit of the voltage that end the run
-_ASTRAY = 0.5  # s in a row that the arm may be too far from the reference: a step takes less
-_SHORTEST = 0.02  # s from rest to the largest velocity
+_SATURATION_TIME_MAX_S = 0.5  # s in a row at a limit of the voltage that end the run
+_TRACKING_ERROR_TIME_MAX_S = 0.5
+"""Seconds in a row that the arm may be too far from the reference: a step takes less."""
+_SPEED_UP_TIME_MIN_S = 0.02  # s from rest to the largest velocity
 _IN_A_ROW = 2.5  # periods between two at most
 
 
@@ -84,15 +85,15 @@ class Limits:
     ) -> None:
         self.voltage_limit, self._step = voltage, slew * period
         self._x, self._v, self._error = position, velocity, error
-        self._a = min(acceleration, velocity / _SHORTEST)
+        self._a = min(acceleration, velocity / _SPEED_UP_TIME_MIN_S)
         bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
         self._governor = Governor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
         self._stop: Stop | None = None
         self._slews = slew < math.inf
         self._said: dict[str, float] = {}
-        self._saturated = _Lasting(_SATURATED, _IN_A_ROW * period)
-        self._astray = _Lasting(_ASTRAY, _IN_A_ROW * period)
+        self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _IN_A_ROW * period)
+        self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, _IN_A_ROW * period)
         self.clamped = 0
         self._chatter: Chatter | None = None
         self._change = 0.0  # V, sum of |dV| in this block
@@ -140,8 +141,9 @@ class Limits:
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
             self._stop = Stop(
                 "tracking",
-                f"The arm has been more than {self._error:g} rad off the reference for {_ASTRAY:g} s "
-                f"(reference {x:.2f} rad, position {sample.position:.2f} rad, t = {sample.t:.3f} s).",
+                f"The arm has been more than {self._error:g} rad off the reference for "
+                f"{_TRACKING_ERROR_TIME_MAX_S:g} s (reference {x:.2f} rad, position {sample.position:.2f} "
+                f"rad, t = {sample.t:.3f} s).",
                 "Look for an obstacle, and at the reference, the gains and supervisor.error_limit_rad.",
                 Urgency.RAMP,
             )
@@ -180,7 +182,7 @@ class Limits:
         if self._saturated.too_long(t):
             self._stop = Stop(
                 "saturation",
-                f"The controller has asked for more than it may have for {_SATURATED:g} s "
+                f"The controller has asked for more than it may have for {_SATURATION_TIME_MAX_S:g} s "
                 f"({demand:.1f} V at t = {t:.3f} s, {self.voltage_limit:g} V allowed).",
                 "Ask for less in [reference], look for an obstacle, or raise amplifier.voltage_limit_V or "
                 "amplifier.slew_V_s if the amplifier has more.",

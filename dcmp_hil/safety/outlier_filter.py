@@ -11,9 +11,9 @@ from dcmp_hil.stop import Stop
 if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample
 
-_FACTOR = 4.0  # times the velocity limit: below, the limit itself is to act
-_FLOOR = 8.0  # counts: noise and the encoder's step at high rates
-_MANY, _WITHIN = 3, 100  # outliers, samples
+_VELOCITY_LIMIT_RATIO = 4.0  # times the velocity limit: below, the limit itself is to act
+_JUMP_MIN_COUNTS = 8.0  # counts: noise and the encoder's step at high rates
+_OUTLIERS_MAX, _WINDOW_SAMPLES = 3, 100  # outliers, samples
 
 
 class Outliers:
@@ -35,12 +35,12 @@ class Outliers:
     """
 
     def __init__(self, velocity_limit: float, period: float, count: float) -> None:
-        self._speed, self._floor = _FACTOR * velocity_limit, _FLOOR * count
+        self._speed, self._floor = _VELOCITY_LIMIT_RATIO * velocity_limit, _JUMP_MIN_COUNTS * count
         self._usual = max(self._speed * period, self._floor)  # rad, from one sample to the next
         self._stop: Stop | None = None
         self._x = self._t = math.nan
         self._samples = 0
-        self._found: deque[int] = deque(maxlen=_MANY)
+        self._found: deque[int] = deque(maxlen=_OUTLIERS_MAX)
         self.count = 0
 
     def reject(self, sample: Sample) -> bool:
@@ -63,13 +63,13 @@ class Outliers:
             self._t, self._x, _, _ = sample
             return False
         self._found.append(self._samples)
-        if len(self._found) < _MANY or self._samples - self._found[0] >= _WITHIN:
+        if len(self._found) < _OUTLIERS_MAX or self._samples - self._found[0] >= _WINDOW_SAMPLES:
             self.count += 1
             return True
         self._stop = Stop(
             "jump",
             f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
-            f"third jump within {_WITHIN} samples.",
+            f"third jump within {_WINDOW_SAMPLES} samples.",
             "Look at the encoder's cable, screen and coupling.",
         )
         return False

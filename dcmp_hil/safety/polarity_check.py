@@ -22,17 +22,19 @@ if TYPE_CHECKING:
 WATCH = 0.1  # s at 0 V: is the arm at rest
 PUSH = 0.1  # s each way at most
 _PROBE_V, _GENTLE, _OVER_FRICTION = 1.0, 15.0, 2.0  # V; rad/s2; friction that a push must overcome by so much
-_REST = 0.02  # rad, that the arm may move while it is watched
-_FAR = 0.03  # rad, at which a push ends early: the whole probe stays within 0.1 rad
-_RISEN, _COASTS, _COASTED = 0.9, 3.0, 0.032  # of the voltage; of the mean speed; rad, where a slow push ends
-_FARTHEST = 0.08  # rad, at which the way back ends early: a slow amplifier turns late
-_REACHED = 0.6  # of the voltage asked for, that must be applied: friction alone may need half
-_SPREAD = 3.0  # measured over believed motor gain, either way, beyond which the probe refuses
-_OFF = 1.25  # beyond which it warns
-_SURE = 4.0  # standard deviations
-_NOISE, _LEAST = 0.4, 1e-4  # counts and rad, of a position
+_REST_TRAVEL_MAX_RAD = 0.02  # rad, that the arm may move while it is watched
+_PUSH_TRAVEL_MAX_RAD = 0.03  # rad, at which a push ends early: the whole probe stays within 0.1 rad
+_VOLTAGE_RISEN_SHARE = 0.9  # of the voltage
+_COASTING_SPEED_RATIO = 3.0  # times the mean speed
+_COASTING_TRAVEL_MAX_RAD = 0.032  # rad, where a slow push ends
+_RETURN_TRAVEL_MAX_RAD = 0.08  # rad, at which the way back ends early: a slow amplifier turns late
+_VOLTAGE_SHARE_MIN = 0.6  # of the voltage asked for, that must be applied: friction alone may need half
+_GAIN_RATIO_MAX = 3.0  # measured over believed motor gain, either way, beyond which the probe refuses
+_GAIN_RATIO_WARNING = 1.25  # beyond which it warns
+_SIGNIFICANCE_DEVIATIONS = 4.0  # standard deviations
+_NOISE_COUNTS, _NOISE_MIN_RAD = 0.4, 1e-4  # counts and rad, of a position
 _PUSHED, _STRONGEST = 2.0, 3.0  # rad/s2, what may push besides; times the believed motor gain
-_TELLING = 2.0  # counts that a push must be expected to move the arm by
+_PUSH_TRAVEL_MIN_COUNTS = 2.0  # counts that a push must be expected to move the arm by
 
 
 class MotorGain(NamedTuple):
@@ -59,7 +61,7 @@ class MotorGain(NamedTuple):
     def told(self, t: float) -> Event:
         """Say it; a warning where the model is further off than 1.25, by more than the fit's own doubt."""
         doubt = self.deviation / self.believed
-        off = self.ratio - doubt > _OFF or self.ratio + doubt < 1.0 / _OFF
+        off = self.ratio - doubt > _GAIN_RATIO_WARNING or self.ratio + doubt < 1.0 / _GAIN_RATIO_WARNING
         said = (
             f"probe: motor gain {self.gain:.3g} +- {self.deviation:.2g} (rad/s2)/V, "
             f"{self.ratio:.2f} times [model]'s {self.believed:g}"
@@ -125,7 +127,7 @@ class Probe:
     @property
     def telling(self) -> bool:
         """Whether the encoder is fine enough for the probe to say anything."""
-        return 0.5 * self._ku * self._push * PUSH * PUSH > _TELLING * self._count
+        return 0.5 * self._ku * self._push * PUSH * PUSH > _PUSH_TRAVEL_MIN_COUNTS * self._count
 
     def check(self, sample: Sample) -> Stop | None:
         """Take a sample; object if the rig is not what the file says.
@@ -145,7 +147,7 @@ class Probe:
 
     def _watch(self, since: float, sample: Sample) -> Stop | None:
         moved = sample.position - self._x0
-        if not -_REST <= moved <= _REST:
+        if not -_REST_TRAVEL_MAX_RAD <= moved <= _REST_TRAVEL_MAX_RAD:
             return Stop(
                 "moving",
                 f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
@@ -160,17 +162,19 @@ class Probe:
     def _push_up(self, since: float, sample: Sample) -> Stop | None:
         self._seen.append((since, sample.position, sample.voltage))
         moved = abs(sample.position - self._x0)
-        if not abs(sample.voltage) >= _RISEN * self._push:
+        if not abs(sample.voltage) >= _VOLTAGE_RISEN_SHARE * self._push:
             self._rise = since
-        coasting = _COASTS * moved / since * self._rise if since > 0.0 else 0.0
-        if not (since < PUSH and moved < _FAR and moved + coasting < _COASTED):
+        coasting = _COASTING_SPEED_RATIO * moved / since * self._rise if since > 0.0 else 0.0
+        if not (
+            since < PUSH and moved < _PUSH_TRAVEL_MAX_RAD and moved + coasting < _COASTING_TRAVEL_MAX_RAD
+        ):
             self._length, self._began = since, sample.t
             self._stage, self.voltage = self._push_down, -self._push
         return None
 
     def _push_down(self, since: float, sample: Sample) -> Stop | None:
         self._seen.append((self._length + since, sample.position, sample.voltage))
-        if since < self._length and abs(sample.position - self._x0) < _FARTHEST:
+        if since < self._length and abs(sample.position - self._x0) < _RETURN_TRAVEL_MAX_RAD:
             return None
         stop = self._judge(np.array(self._seen).T)
         self.over = stop is None
@@ -188,12 +192,12 @@ class Probe:
         )
         gain, deviation = self._gain(seen[0], moved, seen[2])
         self.found = MotorGain(gain, deviation, self._ku)
-        unsure = _SURE * deviation
+        unsure = _SIGNIFICANCE_DEVIATIONS * deviation
         volts, down = f"{self._push:g} V", moved[-1] - up
         said = f"+{volts} moved the arm by {up:+.4f} rad, -{volts} by {down:+.4f} rad"
         unclear = not gain - unsure > 0.0 and gain + unsure > 0.0
         reached = float(np.abs(seen[2]).max())
-        if (not farthest > self._count or unclear) and not reached >= _REACHED * self._push:
+        if (not farthest > self._count or unclear) and not reached >= _VOLTAGE_SHARE_MIN * self._push:
             return self._too_slow(reached)
         if not farthest > self._count:
             return Stop(
@@ -213,7 +217,7 @@ class Probe:
                 f"The arm hardly answers, too little to tell which way: {said}.",
                 'Look what holds it, and at the motor supply; supervisor.probe = "off" starts without.',
             )
-        if not (gain + unsure > self._ku / _SPREAD and gain - unsure < self._ku * _SPREAD):
+        if not (gain + unsure > self._ku / _GAIN_RATIO_MAX and gain - unsure < self._ku * _GAIN_RATIO_MAX):
             return Stop(
                 "gain",
                 f"The arm answers {gain / self._ku:.2g} times as strongly as [model] says: {said}.",
@@ -237,8 +241,8 @@ class Probe:
         out = int(np.flatnonzero(np.abs(moved) == np.abs(moved).max())[-1]) + 1
         t, moved, applied = t[:out], moved[:out], applied[:out]
         columns = np.column_stack([np.ones_like(t), 0.5 * t * t, moved_by(t, applied)])
-        noise = math.hypot(_NOISE * self._count, _LEAST)
-        usual = np.array([max(self._count, _LEAST), _PUSHED, _STRONGEST * self._ku])
+        noise = math.hypot(_NOISE_COUNTS * self._count, _NOISE_MIN_RAD)
+        usual = np.array([max(self._count, _NOISE_MIN_RAD), _PUSHED, _STRONGEST * self._ku])
         covariance = np.linalg.inv(columns.T @ columns / noise**2 + np.diag(usual**-2))
         moved = moved + moved_by(t, self._gravity * np.sin(moved))  # as if it did not fall
         gain = (covariance @ columns.T @ moved)[2] / noise**2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 WINDOW = 8e-3  # s, as the device's; docs/protocol.md, section 8
-_FEWEST = 2.0  # counts in it, below which a limit says nothing
+_WINDOW_COUNTS_MIN = 2.0  # counts in it, below which a limit says nothing
 
 
 def resolution(count: float, period: float) -> float:
@@ -23,4 +23,4 @@ def resolution(count: float, period: float) -> float:
 
 def lowest_limit(count: float, period: float) -> float:
     """Return the lowest speed limit that can be kept, rad/s; docs/safety.md has the reason."""
-    return _FEWEST * resolution(count, period)
+    return _WINDOW_COUNTS_MIN * resolution(count, period)

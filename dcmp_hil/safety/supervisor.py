@@ -59,7 +59,7 @@ TABLE: Mapping[Phase, Mapping[Cue, Phase]] = {
 }
 """What follows what; a cue that is not listed changes nothing. Nothing leads out of TRIPPED."""
 
-_STOP = 0.05  # s that an orderly end takes to 0 V
+_RAMP_TIME_S = 0.05  # s that an orderly end takes to 0 V
 
 
 class Supervisor:
@@ -202,7 +202,7 @@ class Supervisor:
         gone = t - self._since
         if self.phase is Phase.ENGAGING and not gone < self._engage:
             self._cue(Cue.ENGAGED, t)
-        elif self.phase is Phase.STOPPING and not gone < _STOP:
+        elif self.phase is Phase.STOPPING and not gone < _RAMP_TIME_S:
             self._cue(Cue.STOPPED, t)
 
     def _partial_voltage(self, t: float, demand: float) -> float:
@@ -213,7 +213,7 @@ class Supervisor:
         if self.phase is Phase.ENGAGING and gone > 0.0:  # at 0 an infinite limit would give NaN
             most = self.limits.voltage_limit * gone / self._engage
         elif self.phase is Phase.STOPPING:
-            most = self._stop_from * (1.0 - gone / _STOP)
+            most = self._stop_from * (1.0 - gone / _RAMP_TIME_S)
         if not most > 0.0:
             return 0.0
         return self.limits.slewed(max(-most, min(most, demand)), self._last)

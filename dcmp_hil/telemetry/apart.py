@@ -38,16 +38,16 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.statistics import Statistics
 
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
-_COMING_UP = 600.0  # s, a far limit: that it came up is an event, and nothing is armed yet
-_SLOW = 30.0  # s after which the user is told what is waited for
-_ANSWER = 1.5  # s that a process which does nothing has for the figures, at the end of a run
-_REAPING = 0.2  # s
-_LOOK = 0.1  # s
-_LEAVING = 2.0  # s that the end of a run takes at most
-_LAST = 12.0  # s that the end of this process takes at most, for a window that is still opening
-_EVENTS = 10_000
-_LONGEST = 10_000  # characters of an event's text that are sent
-_HEAP = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "131072", "MIMALLOC_PURGE_DELAY": "0"}
+_START_TIMEOUT_S = 600.0  # s, a far limit: that it came up is an event, and nothing is armed yet
+_SLOW_START_S = 30.0  # s after which the user is told what is waited for
+_SUMMARY_TIMEOUT_S = 1.5  # s that a process which does nothing has for the figures, at the end of a run
+_REAP_TIMEOUT_S = 0.2  # s
+_POLL_PERIOD_S = 0.1  # s
+_END_TIMEOUT_S = 2.0  # s that the end of a run takes at most
+_EXIT_TIMEOUT_S = 12.0  # s that the end of this process takes at most, for a window that is still opening
+_EVENTS_MAX = 10_000
+_EVENT_TEXT_CHARS_MAX = 10_000  # characters of an event's text that are sent
+_MALLOC_ENVIRONMENT = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "131072", "MIMALLOC_PURGE_DELAY": "0"}
 """One heap for all threads, and large pieces outside it: a heap for each thread holds a third more.
 
 Rerun's allocator gives free pages back at once and not after a second: it holds 7 MB instead of 22 MB.
@@ -114,8 +114,8 @@ class Apart:
         self._kept = (kept[0], kept[1]) if keep else None
         self._ledger = Ledger(ledger)
         self._warn_user = warn
-        self._told: deque[Event] = deque(maxlen=_EVENTS)
-        self._untold: deque[Event] = deque(maxlen=_EVENTS)
+        self._told: deque[Event] = deque(maxlen=_EVENTS_MAX)
+        self._untold: deque[Event] = deque(maxlen=_EVENTS_MAX)
         self._events = 0  # told or not
         self._channel: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -190,13 +190,13 @@ class Apart:
         """Return the first message; nothing if the process ended, was not waited for, or takes minutes."""
         clock = MonotonicClock()
         began_ns, told = clock.now_ns(), False
-        while not stopped() and (waited := 1e-9 * (clock.now_ns() - began_ns)) < _COMING_UP:
-            if select.select([channel], [], [], min(_LOOK, _COMING_UP))[0]:
-                return receive(channel, _LOOK)
-            if waited > _SLOW and not told and self._warn_user:
+        while not stopped() and (waited := 1e-9 * (clock.now_ns() - began_ns)) < _START_TIMEOUT_S:
+            if select.select([channel], [], [], min(_POLL_PERIOD_S, _START_TIMEOUT_S))[0]:
+                return receive(channel, _POLL_PERIOD_S)
+            if waited > _SLOW_START_S and not told and self._warn_user:
                 told = True
                 self._warn_user(
-                    f"The telemetry process is still starting after {_SLOW:g} s; Ctrl-C ends this."
+                    f"The telemetry process is still starting after {_SLOW_START_S:g} s; Ctrl-C ends this."
                 )
         return b""
 
@@ -212,7 +212,7 @@ class Apart:
                     pass_fds=[theirs.fileno(), terminal, *self._shared],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,  # figures go there, and nothing else
-                    env={**_HEAP, **os.environ},
+                    env={**_MALLOC_ENVIRONMENT, **os.environ},
                 )
             except OSError:
                 ours.close()
@@ -222,29 +222,29 @@ class Apart:
     def _finish(self, process: subprocess.Popen[bytes], channel: socket.socket) -> str:
         """Wait until the process ends; return the error message, empty if there is none."""
         clock = MonotonicClock()
-        end_ns = clock.now_ns() + int(_LEAVING * 1e9)
+        end_ns = clock.now_ns() + int(_END_TIMEOUT_S * 1e9)
         with suppress(OSError):
             self._send_events()
             channel.shutdown(socket.SHUT_WR)
-        if receive_from_working(process, channel, _ANSWER) != FIGURES:
+        if receive_from_working(process, channel, _SUMMARY_TIMEOUT_S) != FIGURES:
             with suppress(subprocess.TimeoutExpired):  # if its end is closed, the process has ended already
-                return how_it_ended(process.wait(_REAPING))
+                return how_it_ended(process.wait(_REAP_TIMEOUT_S))
             end_process(process, 0.0)
-            return f"did not answer for {_ANSWER} s"
+            return f"did not answer for {_SUMMARY_TIMEOUT_S} s"
         if receive(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
             if process.poll() is not None:
                 return how_it_ended(process.returncode)
             atexit.register(
-                end_process, process, _LAST
+                end_process, process, _EXIT_TIMEOUT_S
             )  # a window that is still opening, or a disk that is slow
             return ""
-        end_process(process, _LEAVING)
+        end_process(process, _END_TIMEOUT_S)
         return ""
 
     def _send_events(self) -> None:
         while self._untold and self._channel:
             event = self._untold[0]
-            message = pickle.dumps(tuple(event._replace(text=event.text[:_LONGEST])))
+            message = pickle.dumps(tuple(event._replace(text=event.text[:_EVENT_TEXT_CHARS_MAX])))
             try:
                 self._channel.send(message, socket.MSG_DONTWAIT)
             except OSError:  # no room, or no reader: what is not read is taken over at the end

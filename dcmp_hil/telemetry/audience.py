@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.ipc.ring import Ring
 
 INTERVAL = 0.1  # s between two blocks in real time
-_WAITING = 10_000  # events
+_EVENTS_MAX = 10_000  # events
 
 
 @runtime_checkable
@@ -62,7 +62,7 @@ class Audience:
         self.ring = ring
         self._model = model
         self._sinks = list(sinks)
-        self._events: deque[Event] = deque(maxlen=_WAITING)
+        self._events: deque[Event] = deque(maxlen=_EVENTS_MAX)
         self._report = tell or self._events.append
         self._warned = {id(sink): len(_warnings(sink)) for sink in self._sinks}
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _COLUMN = {name: index for index, name in enumerate(FIELDS)}
 _REFERENCE = slice(_COLUMN["position_reference"], _COLUMN["acceleration_reference"] + 1)
-_SAME = 0.02  # of the delay: instants that differ by less are one
+_SAME_INSTANT_SHARE = 0.02  # of the delay: instants that differ by less are one
 
 
 class Block:
@@ -100,7 +100,7 @@ class Aligner:
     ) -> None:
         self._at = at
         self._delay = delay
-        self._off = _SAME * delay
+        self._off = _SAME_INSTANT_SHARE * delay
         self._began = began
         self._since = began()
         self._due = math.nan  # the instant that the cycle before looked ahead to

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
 UP, FIGURES, DONE = b"up", b"figures", b"done"
 _IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
-_CLOSING = 12.0  # s for all of them; a window that is still opening needs that long
+_CLOSE_TIMEOUT_S = 12.0  # s for all of them; a window that is still opening needs that long
 _TRIM_EVERY = 100  # looks into the ring: 10 s
-_ORPHANED = 1.0  # s for those that are late where the parent is gone: no user looks at a window
+_ORPHAN_CLOSE_TIMEOUT_S = 1.0  # s for those that are late where the parent is gone: no user looks at a window
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,7 @@ class _Watcher:
         """Close the other sinks, the last one first; one that takes its time is waited for at the end."""
         clock = MonotonicClock()
         orphaned = os.getppid() != self._parent
-        end_ns = clock.now_ns() + int((_ORPHANED if orphaned else _CLOSING) * 1e9)
+        end_ns = clock.now_ns() + int((_ORPHAN_CLOSE_TIMEOUT_S if orphaned else _CLOSE_TIMEOUT_S) * 1e9)
         late = [service for service in reversed(self._services) if not service.finish(_IN_TURN)]
         for service in late:
             service.finish(max(0, end_ns - clock.now_ns()) * 1e-9)

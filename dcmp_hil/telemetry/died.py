@@ -8,8 +8,8 @@ from typing import NamedTuple
 from dcmp_hil.ipc.run_end import FORCED, SAID, end_in
 from dcmp_hil.platform.clock import MonotonicClock, pause
 
-_DYING = 5.0  # s for a process whose line has gone to be gone as well
-_LOOK = 0.002  # s
+_EXIT_TIMEOUT_S = 5.0  # s for a process whose line has gone to be gone as well
+_POLL_PERIOD_S = 0.002  # s
 
 
 class Death(NamedTuple):
@@ -44,9 +44,9 @@ def how_it_died(mailbox: int | None, parent: int) -> Death | None:
     if mailbox is None:
         return None if os.getppid() == parent else _DIED
     clock = MonotonicClock()
-    end_ns = clock.now_ns() + int(_DYING * 1e9)
+    end_ns = clock.now_ns() + int(_EXIT_TIMEOUT_S * 1e9)
     while os.getppid() == parent:
         if end_in(mailbox) in SAID or clock.now_ns() > end_ns:
             return None
-        pause(_LOOK)
+        pause(_POLL_PERIOD_S)
     return _FORCED if end_in(mailbox) == FORCED else _DIED

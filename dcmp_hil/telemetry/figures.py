@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.keeper import Keeper
     from dcmp_hil.telemetry.statistics import Statistics
 
-_TROUBLES, _LONGEST = 100, 500  # characters
+_TROUBLES, _TEXT_CHARS_MAX = 100, 500  # characters
 
 
 class Figures:
@@ -51,7 +51,7 @@ class Figures:
     def event(self, event: Event) -> None:
         """Take an event; the first warnings and errors are kept in any case."""
         if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
-            self.troubles.append(f"{event.t:.3f} s: {event.text[:_LONGEST]}")
+            self.troubles.append(f"{event.t:.3f} s: {event.text[:_TEXT_CHARS_MAX]}")
         if self.keeper and event.kind is not EventKind.LINK:  # what they came to is in the result
             self.keeper.event(event)
 

@@ -28,8 +28,8 @@ _MOST_POINTS = 20_000
 _BUCKETS = 4_000  # each keeps its lowest and its highest point
 _COLUMNS = 2  # of plots; the first half of the table is on the left
 _GREY = "#4a4f57"
-_START = 5.0  # times the largest error of the second half: a start beyond that gets no room
-_CLIPPED = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
+_START_ERROR_RATIO = 5.0  # times the largest error of the second half: a start beyond that gets no room
+_DEMAND_CLIP_RATIO = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
 
 
 def draw_run(columns: dict[str, NDArray[np.float64]], title: str, path: Path) -> None:
@@ -152,7 +152,7 @@ def _width(signal: Signal) -> float:
 def _fit_to_sent(axes: Axes, columns: Columns) -> None:
     sent = columns.get("voltage_sent_V")
     if sent is not None and not np.isnan(sent).all():
-        reach = _CLIPPED * float(np.nanmax(np.abs(sent))) or 1.0
+        reach = _DEMAND_CLIP_RATIO * float(np.nanmax(np.abs(sent))) or 1.0
         axes.set_ylim(-reach, reach)
 
 
@@ -164,7 +164,7 @@ def _fit_to_second_half(axes: Axes) -> None:
     if np.isnan(size[len(size) // 2 :]).all():
         return
     whole, half = float(np.nanmax(size)), float(np.nanmax(size[len(size) // 2 :]))
-    if half > 0.0 and whole > _START * half:
+    if half > 0.0 and whole > _START_ERROR_RATIO * half:
         axes.set_ylim(-1.5 * half, 1.5 * half)
         axes.set_title(f"start beyond the scale: {whole:.4g}", loc="right", fontsize=8.5, color=_GREY)
 

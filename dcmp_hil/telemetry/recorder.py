@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorder", "Sink"]
 
-_IN_LINE = 4096  # rows a block in virtual time, where no viewer waits, at most
+_SYNCHRONOUS_BLOCK_ROWS_MAX = 4096  # rows a block in virtual time, where no viewer waits, at most
 _CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
-_LAST_BLOCK = 2.0  # s that the end of a run waits for the thread
+_END_TIMEOUT_S = 2.0  # s that the end of a run waits for the thread
 
 
 class Recorder:
@@ -64,14 +64,16 @@ class Recorder:
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self._apart = apart
-        self._ring = apart.ring if apart else Ring(_IN_LINE if in_line else _CAPACITY)
+        self._ring = apart.ring if apart else Ring(_SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY)
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now
         self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model)
         self.link = LinkWatch(backend, 1, self.event)
         self._look_at_link = self.link.look
-        self._every = self._left = min(recent, _IN_LINE)  # periods until what is done now and then
+        self._every = self._left = min(
+            recent, _SYNCHRONOUS_BLOCK_ROWS_MAX
+        )  # periods until what is done now and then
         self._in_line = in_line
         self._service = Service(self._audience) if sinks and not in_line else None
         self._closed = False
@@ -119,6 +121,6 @@ class Recorder:
             self._audience.finish()
             return
         if self._service:
-            self._service.finish(_LAST_BLOCK)
+            self._service.finish(_END_TIMEOUT_S)
         if self._apart:
             self._apart.close()

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 BOUNDS_US = (*(mantissa * 10.0**power for power in range(6) for mantissa in (1.0, 2.0, 5.0)), 1e6)
-_LATE = 0.5  # of a period: a sample that arrives later than this counts as late
+_LATE_MIN_PERIODS = 0.5  # of a period: a sample that arrives later than this counts as late
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class Statistics:
         self.lateness.add(block["lateness"][window])
         self.compute.add(block["compute"][window])
         self._periods += len(inside)
-        self._late += int((block["lateness"][window] > _LATE * self._period).sum())
+        self._late += int((block["lateness"][window] > _LATE_MIN_PERIODS * self._period).sum())
         self._add_voltage(block["voltage_sent"][window])
         if math.isnan(self._first_t):
             self._first_t, self._first_lateness = float(t[window][0]), float(block["lateness"][window][0])

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.cobs import Receiver as Cobs
     from dcmp_hil.wire.slcan import Receiver as Slcan
 
-_FEWEST = 2  # SAMPLEs: one may be an accident
+_SAMPLES_MIN = 2  # SAMPLEs: one may be an accident
 
 
 def has_samples(data: bytes, receiver: Cobs | Slcan) -> bool:
@@ -22,4 +22,4 @@ def has_samples(data: bytes, receiver: Cobs | Slcan) -> bool:
             found += isinstance(unpack(frame, frame[0] & 0xF), SampleReport)
         except CorruptFrameError:
             continue
-    return found >= _FEWEST
+    return found >= _SAMPLES_MIN

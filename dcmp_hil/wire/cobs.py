@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
 
-_LEAST, _MOST = 6, 13  # bytes of an encoded frame, without its delimiter
-_HIGHEST = 0x7FF
-_ID_CRC = [crc_hqx(number.to_bytes(2, "little"), 0xFFFF) for number in range(_HIGHEST + 1)]
+_FRAME_BYTES_MIN, _FRAME_BYTES_MAX = 6, 13  # bytes of an encoded frame, without its delimiter
+_IDENTIFIER_MAX = 0x7FF
+_ID_CRC = [crc_hqx(number.to_bytes(2, "little"), 0xFFFF) for number in range(_IDENTIFIER_MAX + 1)]
 """CRC-16/IBM-3740 of every identifier: where that of its payload goes on."""
 _two_bytes = Struct("<H").pack
-_DISTANCE = [bytes((length + 1,)) for length in range(_MOST)]
-_take_apart = [Struct(f"<xH{max(0, length - 5)}sH").unpack for length in range(_MOST + 1)]
+_DISTANCE = [bytes((length + 1,)) for length in range(_FRAME_BYTES_MAX)]
+_take_apart = [Struct(f"<xH{max(0, length - 5)}sH").unpack for length in range(_FRAME_BYTES_MAX + 1)]
 
 
 def _beginning(number: int) -> tuple[bytes, bytes]:
@@ -24,7 +24,7 @@ def _beginning(number: int) -> tuple[bytes, bytes]:
     return b"".join(_DISTANCE[len(part)] + part for part in ended), open_
 
 
-_BEGINNING = [_beginning(number) for number in range(_HIGHEST + 1)]
+_BEGINNING = [_beginning(number) for number in range(_IDENTIFIER_MAX + 1)]
 
 
 def encode(frame: Frame) -> bytes:
@@ -61,7 +61,7 @@ class Receiver:
                     frames.append(frame)
                 else:
                     self.corrupt += 1
-        if self._too_long or len(rest) > _MOST:
+        if self._too_long or len(rest) > _FRAME_BYTES_MAX:
             self.corrupt += not self._too_long
             self._too_long = True
             rest = b""
@@ -72,7 +72,7 @@ class Receiver:
 def _decode(chunk: bytes) -> Frame | None:
     """Undo COBS and check what comes out; None if it is no frame."""
     length = len(chunk)
-    if not _LEAST <= length <= _MOST:
+    if not _FRAME_BYTES_MIN <= length <= _FRAME_BYTES_MAX:
         return None
     body, place = bytearray(chunk), chunk[0]
     while place < length:  # every distance becomes the zero that it stands for; the first is not read
@@ -82,6 +82,6 @@ def _decode(chunk: bytes) -> Frame | None:
     if place != length:
         return None
     number, data, check = _take_apart[length](body)
-    if number > _HIGHEST or crc_hqx(data, _ID_CRC[number]) != check:
+    if number > _IDENTIFIER_MAX or crc_hqx(data, _ID_CRC[number]) != check:
         return None
     return number, data

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 HEALTH_END = 255
 """Where the counters of HEALTH stop."""
-_FEWEST = 10  # events that make a share worth a warning
-_FEW, _LARGE = 3, 0.05  # of a large share of the periods, as in a run that ended soon, fewer do
+_EVENTS_MIN = 10  # events that make a share worth a warning
+_EVENTS_OF_LARGE_SHARE_MIN = 3  # events: enough if they are a large share of the periods, as in a short run
+_LARGE_SHARE = 0.05  # of the periods
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,8 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
     found = [
         _concern(cause, count, periods if cause != "samples_damaged" else counters.samples + count, text)
         for cause, count, text in _losses(counters)
-        if count > most * periods and (count >= _FEWEST or (count >= _FEW and count > _LARGE * periods))
+        if count > most * periods
+        and (count >= _EVENTS_MIN or (count >= _EVENTS_OF_LARGE_SHARE_MIN and count > _LARGE_SHARE * periods))
     ]
     device = counters.device
     if device and device.bus_offs:
@@ -107,7 +109,9 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
     error = counters.clock_error
     if error is not None and abs(error) > most_clock:
         way = "fast" if error > 0 else "slow"
-        found.append(Concern("device_clock", error, _CLOCK.format(share=_percent(abs(error)), way=way)))
+        found.append(
+            Concern("device_clock", error, _CLOCK_WARNING.format(share=_percent(abs(error)), way=way))
+        )
     return found
 
 
@@ -121,13 +125,13 @@ def _losses(counters: LinkCounters) -> list[tuple[str, int, str]]:
     unheard = max(0, counters.missed - counters.lost - counters.skipped - counters.late)
     damaged_up = "crc_errors" in device.full or 2 * device.crc_errors >= unheard
     return [
-        ("commands_lost", 0 if damaged_up else unheard, _COMMANDS),
+        ("commands_lost", 0 if damaged_up else unheard, _COMMANDS_WARNING),
         ("commands_damaged", max(device.crc_errors, unheard if damaged_up else 0), _DAMAGED_UP),
         ("samples_damaged", counters.corrupt, _DAMAGED_DOWN),
         # Where the end of a frame is damaged it takes the next one along.
-        ("samples_lost", max(0, counters.lost - 2 * counters.corrupt), _SAMPLES),
-        ("line_too_slow", device.ring_overruns, _BLOCKED),
-        ("device_late", device.late_ticks, _LATE),
+        ("samples_lost", max(0, counters.lost - 2 * counters.corrupt), _SAMPLES_WARNING),
+        ("line_too_slow", device.ring_overruns, _BLOCKED_WARNING),
+        ("device_late", device.late_ticks, _LATE_WARNING),
     ]
 
 
@@ -135,7 +139,7 @@ def _percent(share: float) -> str:
     return f"{1e2 * share:.2g} %" if share < 0.1 else f"{1e2 * share:.0f} %"  # noqa: PLR2004
 
 
-_COMMANDS = (
+_COMMANDS_WARNING = (
     "{share} of the commands never reached the device, or came too old ({count} periods without one), though "
     "this computer sent them in time. Check the way from host to device: TX wire, adapter, input buffer."
 )
@@ -147,20 +151,20 @@ _DAMAGED_DOWN = (
     "{share} of what the device sent arrived damaged ({count} frames). Check cable, shield, ground and "
     "termination of the way from device to host, and the baud or bit rate."
 )
-_SAMPLES = (
+_SAMPLES_WARNING = (
     "{share} of the samples never arrived ({count}), and not because of damage. Check the way from device to "
     "host: adapter, buffers, another program on the same bus."
 )
-_BLOCKED = (
+_BLOCKED_WARNING = (
     "{share} of the device's reports waited so long that newer ones replaced them ({count}). The line is too "
     "slow for this rate, or its reader was: raise the baud or bit rate, or lower loop.rate_hz."
 )
-_LATE = (
+_LATE_WARNING = (
     "The device was late for {share} of its ticks ({count}). Its processor is too slow for this rate, or "
     "something on the board blocks it: lower loop.rate_hz, or look at the firmware."
 )
 _BUS_OFF = "The device's link went down {count} times. Check connectors, and on CAN termination and bit rate."
-_CLOCK = (
+_CLOCK_WARNING = (
     "The device's clock is {share} {way} against this computer's: velocities and times are wrong by as much. "
     "Check the timer's prescaler and the crystal's frequency in the firmware (a build for another board?)."
 )

@@ -13,10 +13,10 @@ from pathlib import Path
 from dcmp_hil.errors import OpenError
 from sim_backend.board import build_cache
 
-_HERE = Path(__file__).parents[1]
-_PLACES = (_HERE / "firmware", _HERE.parent / "firmware")  # in the wheel; in a checkout
+_PACKAGE_ROOT = Path(__file__).parents[1]
+_PLACES = (_PACKAGE_ROOT / "firmware", _PACKAGE_ROOT.parent / "firmware")  # in the wheel; in a checkout
 _FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
-_SECONDS = 120
+_COMPILE_TIMEOUT_S = 120
 _INSTALL = "apt install gcc libc6-dev"
 
 
@@ -102,7 +102,7 @@ def _run(command: list[str]) -> str:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=_SECONDS,
+            timeout=_COMPILE_TIMEOUT_S,
             check=False,
             start_new_session=True,  # Ctrl-C is for us
         )

@@ -16,14 +16,14 @@ RECORD = "<HB8s"
 VOLTAGE, ENABLE, STATE, FAULT, OWNER, LINK_UP, OUT_LENGTH, OUT_OFFSET = range(8)
 """Indices of `struct hostlib_view`."""
 
-_SELDOM = (
+_RARE_CALLS = (
     ("init", ctypes.c_bool, (ctypes.c_char_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_uint32)),
     ("look", None, (ctypes.c_uint32,)),
     ("link", None, (ctypes.c_bool, ctypes.c_uint32)),
     ("size", ctypes.c_size_t, None),
     ("config_size", ctypes.c_size_t, None),
 )
-_ALWAYS = ("tick", "receive", "receive_frame")
+_FREQUENT_CALLS = ("tick", "receive", "receive_frame")
 """They take a pointer, bytes, and integers of 32 bits, which is what ctypes makes of an int by itself:
 without declared types a call takes half the time."""
 
@@ -48,11 +48,11 @@ def load() -> ctypes.PyDLL:
             f"{path}: cannot be loaded ({error}). Delete {path.parent} to have it made again, or point "
             "XDG_CACHE_HOME at a folder that programs may be started from."
         ) from error
-    for name, result, arguments in _SELDOM:
+    for name, result, arguments in _RARE_CALLS:
         function = getattr(library, f"hostlib_{name}")
         function.restype = result
         function.argtypes = () if arguments is None else (ctypes.c_void_p, *arguments)
-    for name in _ALWAYS:
+    for name in _FREQUENT_CALLS:
         getattr(library, f"hostlib_{name}").restype = None
     if library.hostlib_config_size() != LAYOUT.size:
         raise AssertionError(f"{path}: struct dcmp_config is not what sim_backend.board.config says")

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Truth
 
-_LIVE = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE
+_ARMED_STATES = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE
 _BRISK_MS = 2  # wall: how long a tick in plant time waits for a host that does not drive
 _ANSWER_S = 10.0  # wall: the process is gone if it takes longer
 _END_S = 2.0
-_KEPT = 10_000
+_LOG_OUTPUTS_MAX = 10_000
 _WORD = 0xFFFF_FFFF
 
 
@@ -83,7 +83,7 @@ class VirtualDevice:
         self.tick_count = 0
         self.port = ""
         self.output = Output(self.now_us, self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
-        self.log: deque[Output] = deque(maxlen=_KEPT)
+        self.log: deque[Output] = deque(maxlen=_LOG_OUTPUTS_MAX)
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
         self._changes = select.poll()
@@ -217,7 +217,7 @@ class VirtualDevice:
             self.pins.advance(self.output.voltage_mV)
             self.now_us = (self.now_us + self._config["period_us"]) & _WORD
         self.tick_count += 1
-        wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _LIVE else _BRISK_MS
+        wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _ARMED_STATES else _BRISK_MS
         flags = 0 if self._pace else PLANT_TIME
         sent_ns = self._now_ns()
         try:

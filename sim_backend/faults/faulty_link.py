@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sim_backend.pacer import Pacer
 
 _ENDS = {"cobs": b"\0", "slcan": b"\r"}
-_HIGHEST, _LONGEST = 0x7FF, 8
+_IDENTIFIER_MAX, _PAYLOAD_BYTES_MAX = 0x7FF, 8
 
 
 class LineFaults(Protocol):
@@ -101,4 +101,4 @@ class FaultyLink(BoardLink):
 
 def _frame(piece: bytes) -> Frame:
     """Make the frame of a piece, however damaged."""
-    return int.from_bytes(piece[:2], "little") & _HIGHEST, piece[2 : 2 + _LONGEST]
+    return int.from_bytes(piece[:2], "little") & _IDENTIFIER_MAX, piece[2 : 2 + _PAYLOAD_BYTES_MAX]

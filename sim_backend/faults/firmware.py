@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sim_backend.pacer import Pacer
 
 _CARRIERS: dict[str, Any] = {"cobs": cobs, "slcan": slcan}
-_SEQ, _WORD = 0x1FFF, 2.0**32 - 1
+_SEQUENCE_MASK, _WORD = 0x1FFF, 2.0**32 - 1
 
 
 class Reset(FaultModel):
@@ -94,7 +94,7 @@ class RogueDrive(RogueHost):
 
     def message(self, board: Board) -> Message:
         """Ask for a voltage."""
-        seq = (board.tick_count - 1) & _SEQ
+        seq = (board.tick_count - 1) & _SEQUENCE_MASK
         return Drive(round(1e3 * self.number("V")), seq, True, False, False, self.other(board), 20)
 
 

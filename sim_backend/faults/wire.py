@@ -17,7 +17,7 @@ Way = Literal["up", "down"]
 """`up`: from host to device."""
 
 _WAY = Choice(("both", "up", "down"))
-_LATELY = 25  # pieces, the longest burst
+_BURST_PIECES_MAX = 25  # pieces, the longest burst
 
 
 def _probability(default: float) -> Number:
@@ -223,7 +223,7 @@ WIRE = {
     "wire.drop": Kind(
         Drop,
         "pieces are lost, `burst` in a row",
-        {"p": _probability(0.1), "burst": Number("", 1, _LATELY, 1), "way": _WAY},
+        {"p": _probability(0.1), "burst": Number("", 1, _BURST_PIECES_MAX, 1), "way": _WAY},
         wired=True,
     ),
     "wire.dup": Kind(Duplicate, "pieces come twice", {"p": _probability(0.2), "way": _WAY}, wired=True),

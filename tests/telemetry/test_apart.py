@@ -229,7 +229,7 @@ def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: s
     os.waitid(os.P_PID, apart.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)  # until then it may still work
     began = time.monotonic()
     apart.close()
-    assert time.monotonic() - began < module._LEAVING + 0.5  # noqa: SLF001 - and what the scheduler needs
+    assert time.monotonic() - began < module._END_TIMEOUT_S + 0.5  # noqa: SLF001 - and what the scheduler needs
     assert len(apart.figures.columns()["time_s"]) == 100
 
 
@@ -268,7 +268,7 @@ def test_events_never_block_and_come_back_although_they_are_not_read() -> None:
 def test_a_process_that_does_not_come_up_is_told_of_and_the_run_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "_COMING_UP", 0.5)
+    monkeypatch.setattr(module, "_START_TIMEOUT_S", 0.5)
     told: list[str] = []
     session = Session(bench(), duration=0.3, sinks=[partial(Sleeps, 60.0)], warn=told.append)
     session.run()
@@ -300,15 +300,15 @@ class Busy(Notes):
 
 
 def test_a_process_that_ends_at_once_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_COMING_UP", 1e6)  # never
+    monkeypatch.setattr(module, "_START_TIMEOUT_S", 1e6)  # never
     result = run(bench(), duration=0.2, sinks=[partial(Leaves)])
     assert result.summary.periods == 200
     assert "did not come up" in result.troubles[0]
 
 
 def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_COMING_UP", 1e6)
-    monkeypatch.setattr(module, "_SLOW", 0.3)
+    monkeypatch.setattr(module, "_START_TIMEOUT_S", 1e6)
+    monkeypatch.setattr(module, "_SLOW_START_S", 0.3)
     told: list[str] = []
     apart = Apart(Statistics(_T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append)
     apart.open(lambda: bool(told))

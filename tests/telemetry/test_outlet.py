@@ -62,7 +62,7 @@ def test_a_stuck_job_is_noticed_and_close_returns(gate: threading.Event) -> None
     stream = Stream()
     way = outlet(stream, patience=0.01, ending=0.05)
     way.do(lambda _: gate.wait())  # type: ignore[arg-type]
-    answers = [way.do(lambda _: None) for _ in range(module._WAITING + 2)]  # noqa: SLF001
+    answers = [way.do(lambda _: None) for _ in range(module._JOBS_MAX + 2)]  # noqa: SLF001
     assert answers[0]
     assert not answers[-1]
     way.close(10.0)
@@ -87,7 +87,7 @@ def test_a_file_that_does_not_grow_is_told_of_with_what_was_measured(
 def test_a_file_that_cannot_grow_is_not_waited_for(
     gate: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_FULL_STALL", 0.1)
+    monkeypatch.setattr(module, "_FULL_DISK_STALL_TIMEOUT_S", 0.1)
     monkeypatch.setattr(module, "room_for", lambda _: 0)
     way = Outlet(Stream(), 1.0, 60.0, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
     way.do(lambda _: gate.wait())  # type: ignore[arg-type]
@@ -98,7 +98,7 @@ def test_a_file_that_cannot_grow_is_not_waited_for(
 def test_a_file_that_grows_slowly_is_waited_for(
     gate: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_FULL_STALL", 60.0)
+    monkeypatch.setattr(module, "_FULL_DISK_STALL_TIMEOUT_S", 60.0)
     file = tmp_path / "run.rrd"
 
     def slowly(_: object) -> None:

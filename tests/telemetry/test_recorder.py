@@ -130,7 +130,7 @@ def test_recorder_outlives_every_sink_that_raises() -> None:
 
 
 def test_recorder_does_not_wait_for_a_sink_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_LAST_BLOCK", 0.05)  # s, instead of 2
+    monkeypatch.setattr(module, "_END_TIMEOUT_S", 0.05)  # s, instead of 2
     stuck = _Hangs()
     recorder = _recorder(stuck, in_line=False)
     _record(recorder, 10)
@@ -144,7 +144,7 @@ def test_recorder_does_not_wait_for_a_sink_that_hangs(monkeypatch: pytest.Monkey
 
 def test_recorder_counts_what_a_hanging_sink_kept_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     # What session.Result promises: periods lost because a sink was slow are counted, and in no figure.
-    monkeypatch.setattr(module, "_LAST_BLOCK", 0.05)
+    monkeypatch.setattr(module, "_END_TIMEOUT_S", 0.05)
     sink, stuck = _Sink(), _Hangs()
     recorder = _recorder(sink, stuck, in_line=False)
     _record(recorder, 10)

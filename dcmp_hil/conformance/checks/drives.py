@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 ROOM = 200  # a counter of HEALTH below this has room for what is sent here
-_TRIES = 40
+_ATTEMPTS_MAX = 40
 
 
 def was_accepted(client: Client, send: Callable[[], None]) -> bool:
@@ -27,8 +27,8 @@ def was_accepted(client: Client, send: Callable[[], None]) -> bool:
 def accepted(client: Client) -> Iterator[str]:
     """Answer SAMPLEs; the device takes the answers, and says missed in the other periods."""
     session = client.own()
-    if not any(was_accepted(client, lambda: client.drive(session)) for _ in range(_TRIES)):
-        yield f"none of {_TRIES} DRIVEs, each answering the newest SAMPLE, was accepted"
+    if not any(was_accepted(client, lambda: client.drive(session)) for _ in range(_ATTEMPTS_MAX)):
+        yield f"none of {_ATTEMPTS_MAX} DRIVEs, each answering the newest SAMPLE, was accepted"
         return
     client.settled_state()
     if any(not seen.sample.missed for seen in client.listen(20)):
@@ -80,7 +80,7 @@ def oldest(client: Client) -> Iterator[str]:
     """Answer the oldest SAMPLE that may be answered, where the line is quick enough."""
     session = client.own()
     quick = 0
-    for _ in range(_TRIES):
+    for _ in range(_ATTEMPTS_MAX):
         client.newest()
         at, mark = client.tick, client.mark()
         client.drive(session)
@@ -89,7 +89,7 @@ def oldest(client: Client) -> Iterator[str]:
         client.listen(client.reach + 1)  # or it would be older than the one before
         if was_accepted(client, lambda: client.drive(session, back=client.reach)):
             return
-    if quick < _TRIES // 2:
+    if quick < _ATTEMPTS_MAX // 2:
         raise NotJudgedError("the way to the device takes more than a period")
     yield f"no DRIVE was accepted whose SAMPLE was {client.reach} periods old; so many may pass"
 
@@ -98,7 +98,7 @@ def order(client: Client) -> Iterator[str]:
     """Send the same DRIVE again, and one that is older: a command is taken once, and never turns back."""
     session = client.own()
     before = client.health().sequence_gaps
-    for _ in range(_TRIES):
+    for _ in range(_ATTEMPTS_MAX):
         mark = client.mark()
         client.newest()
         at = client.tick

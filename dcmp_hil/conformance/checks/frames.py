@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 FULL = 255  # a counter that stops counts nothing any more
-_REPEATS = 3
+_REPETITIONS = 3
 
 
 def layout(client: Client) -> Iterator[str]:
@@ -36,7 +36,7 @@ def spoilt(client: Client) -> Iterator[str]:
     session = client.own()
     before = client.health().crc_errors
     mark = client.mark()
-    for _ in range(_REPEATS):
+    for _ in range(_REPETITIONS):
         client.drive(session, spoilt=True)
         client.send_spoilt(Stop(0))
     since = client.after_fence(mark)
@@ -48,16 +48,16 @@ def spoilt(client: Client) -> Iterator[str]:
     client.send_spoilt(Hello(0, PROTOCOL_HASH))
     client.send_spoilt(ParameterGet(1))
     client.listen(client.periods(50))
-    answers = [message for message in client.heard[at:] if type(message).__name__ in _ANSWERS]
+    answers = [message for message in client.heard[at:] if type(message).__name__ in _ANSWER_NAMES]
     if answers:
         yield f"a question whose crc8 is wrong was answered: {answers[0]}"
     grown = client.health().crc_errors - before
-    expected = 2 * _REPEATS + 2
+    expected = 2 * _REPETITIONS + 2
     if before + expected < FULL and grown != expected:
         yield f"{expected} frames with a wrong crc8 were sent, HEALTH.crc_errors grew by {grown}"
 
 
-_ANSWERS = ("Identity", "ParameterValue")
+_ANSWER_NAMES = ("Identity", "ParameterValue")
 
 
 def foreign(client: Client) -> Iterator[str]:

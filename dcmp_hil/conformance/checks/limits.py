@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _WINDOW_MS, _MORE = 8.0, 1
 """ms that a session's speed limit is taken over, and counts that may show more than it says."""
 _COUNTS = 2**24
-_AWAY, _REACH = 1000, 500
+_FAR_COUNTS, _TRAVEL_LIMIT_COUNTS = 1000, 500
 """Counts from the arm to an origin, and a travel limit that it does not reach."""
 
 
@@ -83,11 +83,17 @@ def speed(client: Client) -> Iterator[str]:
 
 def origin(client: Client) -> Iterator[str]:
     """Arm with an origin from which the arm is too far away, and with one from which it is not."""
-    if client.value(Parameter.TRAVEL_LIMIT_COUNTS) < _REACH:
-        raise NotJudgedError(f"the board was built with a travel limit below {_REACH} counts")
-    for away, too_far in ((_REACH // 2, False), (-_REACH // 2, False), (_AWAY, True), (-_AWAY, True)):
+    if client.value(Parameter.TRAVEL_LIMIT_COUNTS) < _TRAVEL_LIMIT_COUNTS:
+        raise NotJudgedError(f"the board was built with a travel limit below {_TRAVEL_LIMIT_COUNTS} counts")
+    limit = f"a limit of {_TRAVEL_LIMIT_COUNTS}"
+    for away, too_far in (
+        (_TRAVEL_LIMIT_COUNTS // 2, False),
+        (-_TRAVEL_LIMIT_COUNTS // 2, False),
+        (_FAR_COUNTS, True),
+        (-_FAR_COUNTS, True),
+    ):
         session = client.own()
-        lower(client, session, Parameter.TRAVEL_LIMIT_COUNTS, _REACH)
+        lower(client, session, Parameter.TRAVEL_LIMIT_COUNTS, _TRAVEL_LIMIT_COUNTS)
         here = client.newest().sample.position_counts
         lower(client, session, Parameter.TRAVEL_ORIGIN_COUNTS, (here + away) % _COUNTS)
         at = len(client.heard)
@@ -95,13 +101,13 @@ def origin(client: Client) -> Iterator[str]:
         client.answer(3, session, 0)
         report = next((one for one in client.heard[at:] if isinstance(one, FaultReport)), None)
         if too_far and report is None:
-            yield f"armed {_AWAY} counts from TRAVEL_ORIGIN_COUNTS the device runs, under a limit of {_REACH}"
+            yield f"armed {_FAR_COUNTS} counts from TRAVEL_ORIGIN_COUNTS the device runs, under {limit}"
         elif too_far and report is not None and report.code != Fault.OVER_TRAVEL:
             yield f"armed too far from TRAVEL_ORIGIN_COUNTS it says fault {report.code}, the page says 6"
         elif too_far and report is not None and abs(report.detail + away) > 2:  # noqa: PLR2004 - it trembles
             yield f"FAULT(OVER_TRAVEL) says {report.detail} counts, {-away} from TRAVEL_ORIGIN_COUNTS"
         elif not too_far and report is not None:
-            yield f"armed {away} counts from TRAVEL_ORIGIN_COUNTS it faults, under a limit of {_REACH}"
+            yield f"armed {away} counts from TRAVEL_ORIGIN_COUNTS it faults, under {limit}"
         _leave(client, session)
 
 

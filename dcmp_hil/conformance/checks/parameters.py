@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-_LARGEST = 2**31 - 1
+_VALUE_MAX = 2**31 - 1
 _FIRST_ARMING = -1  # TRAVEL_ORIGIN_COUNTS that no session has set
-_UNKNOWN = (0, 17, 100, 255)
+_UNKNOWN_PARAMETERS = (0, 17, 100, 255)
 _READ_ONLY = (
     *(Parameter.BOARD, Parameter.BOOT_COUNT, Parameter.RESET_CAUSE, Parameter.TICK),
     *(Parameter.COUNTS_PER_REV, Parameter.PERIOD_US, Parameter.LAST_FAULT, Parameter.LAST_FAULT_DETAIL),
@@ -26,20 +26,20 @@ _LIMITS = (
     Parameter.TRAVEL_LIMIT_COUNTS,
 )
 _RANGES = {
-    Parameter.BOARD: (1, _LARGEST),
-    Parameter.BOOT_COUNT: (0, _LARGEST),
+    Parameter.BOARD: (1, _VALUE_MAX),
+    Parameter.BOOT_COUNT: (0, _VALUE_MAX),
     Parameter.RESET_CAUSE: (0, 5),
-    Parameter.TICK: (0, _LARGEST),
+    Parameter.TICK: (0, _VALUE_MAX),
     Parameter.COUNTS_PER_REV: (1, 2**24),
     Parameter.PERIOD_US: (1, 50_000),
     Parameter.VOLTAGE_LIMIT_MV: (1, 32_767),
-    Parameter.SLEW_MV_PER_MS: (0, _LARGEST),
+    Parameter.SLEW_MV_PER_MS: (0, _VALUE_MAX),
     Parameter.WATCHDOG_MS: (5, 50),
-    Parameter.SPEED_LIMIT_COUNTS_S: (1, _LARGEST),
-    Parameter.TRAVEL_LIMIT_COUNTS: (1, _LARGEST),
+    Parameter.SPEED_LIMIT_COUNTS_S: (1, _VALUE_MAX),
+    Parameter.TRAVEL_LIMIT_COUNTS: (1, _VALUE_MAX),
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
-    Parameter.SUPPLY_MV: (0, _LARGEST),
+    Parameter.SUPPLY_MV: (0, _VALUE_MAX),
     Parameter.TRAVEL_ORIGIN_COUNTS: (_FIRST_ARMING, 2**24 - 1),
 }
 
@@ -53,7 +53,7 @@ def read(client: Client) -> Iterator[str]:
             continue
         if found.result != Result.OK:
             yield f"{parameter.name} is answered by result {found.result}; every device has it"
-        low, high = _RANGES.get(parameter, (-_LARGEST - 1, _LARGEST))
+        low, high = _RANGES.get(parameter, (-_VALUE_MAX - 1, _VALUE_MAX))
         if not low <= found.value <= high:
             yield f"{parameter.name} is {found.value}, not within {low} .. {high}"
 
@@ -61,7 +61,7 @@ def read(client: Client) -> Iterator[str]:
 def unknown(client: Client) -> Iterator[str]:
     """Check the answers to requests for parameters that do not exist."""
     session = client.own()
-    for number in _UNKNOWN:
+    for number in _UNKNOWN_PARAMETERS:
         for what, found in (
             ("GET", client.get(number)),
             ("SET by the owner", client.put(session, number, 1)),
@@ -112,14 +112,14 @@ def ranges(client: Client) -> Iterator[str]:
             (1, Result.OK),
             (0, Result.OUT_OF_RANGE),
             (-1, Result.OUT_OF_RANGE),
-            (-_LARGEST - 1, Result.OUT_OF_RANGE),
+            (-_VALUE_MAX - 1, Result.OUT_OF_RANGE),
             (max(1, built // 2), Result.OK),
             (built, Result.OK),
         ):
             yield from _tried(client, session, parameter, value, expected)
-        if built < _LARGEST:
+        if built < _VALUE_MAX:
             yield from _tried(client, session, parameter, built + 1, Result.OUT_OF_RANGE)
-            yield from _tried(client, session, parameter, _LARGEST, Result.OUT_OF_RANGE)
+            yield from _tried(client, session, parameter, _VALUE_MAX, Result.OUT_OF_RANGE)
     built = client.value(Parameter.WATCHDOG_MS)
     for value, expected in (
         (5, Result.OK),
@@ -136,7 +136,7 @@ def ranges(client: Client) -> Iterator[str]:
     if slew:
         yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, slew + 1, Result.OUT_OF_RANGE)
     else:
-        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, _LARGEST, Result.OK)
+        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, _VALUE_MAX, Result.OK)
     for value, expected in (
         (0, Result.OK),
         (2**24, Result.OUT_OF_RANGE),

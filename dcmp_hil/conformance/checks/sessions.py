@@ -90,7 +90,7 @@ def repeated_hello(client: Client) -> Iterator[str]:
     client.drive(session)  # and still, after another HELLO
     client.after_fence(mark)
     grown = client.health().sequence_gaps - before
-    if before < _SOME and grown < 2:  # noqa: PLR2004 - two were sent
+    if before < _COUNTER_MAX and grown < 2:  # noqa: PLR2004 - two were sent
         yield "a DRIVE with the seq of the one before was accepted after the owner's second HELLO"
 
 
@@ -99,7 +99,7 @@ _SETTABLE = (
     *(Parameter.SPEED_LIMIT_COUNTS_S, Parameter.TRAVEL_LIMIT_COUNTS, Parameter.EDGE_STAMPS),
     Parameter.TRAVEL_ORIGIN_COUNTS,
 )
-_SOME = 240  # a counter of HEALTH below this has room
+_COUNTER_MAX = 240  # a counter of HEALTH below this has room
 
 
 def _accepted(client: Client, session: int) -> None:

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.listener import Seen
 
 _SILENT_S = 0.4
-_SLOWEST, _FASTEST = 0.5, 2.0  # of the device's clock by this computer's: far beyond any crystal
-_ANSWERS = 16
+_CLOCK_RATIO_MIN = 0.5  # of the device's clock by this computer's: far beyond any crystal
+_CLOCK_RATIO_MAX = 2.0  # the same, upper bound
+_REQUESTS = 16
 _IDLE_PERCENT = 100
 
 
@@ -85,7 +86,7 @@ def counter_goes_on(client: Client) -> Iterator[str]:
     passed_us = (clock.now_ns() - began_ns) / 1000
     periods = passed_us / client.period_us
     counted = (value - first) % 2**31
-    if not _SLOWEST * periods <= counted <= _FASTEST * periods:
+    if not _CLOCK_RATIO_MIN * periods <= counted <= _CLOCK_RATIO_MAX * periods:
         yield (
             f"{periods:.0f} periods of {client.period_us} us passed while nothing was read, TICK went on by "
             f"{counted}: it counts periods, whether their SAMPLE could be sent or not"
@@ -131,15 +132,15 @@ def answers(client: Client) -> Iterator[str]:
     """Ask sixteen questions at once."""
     client.drain()
     at = len(client.heard)
-    for _ in range(_ANSWERS):
+    for _ in range(_REQUESTS):
         client.send(ParameterGet(Parameter.PERIOD_US))
     client.settled_state()
     came = sum(
         isinstance(message, ParameterValue) and message.id == Parameter.PERIOD_US
         for message in client.heard[at:]
     )
-    if came != _ANSWERS:
-        yield f"{_ANSWERS} questions sent at once were answered {came} times"
+    if came != _REQUESTS:
+        yield f"{_REQUESTS} questions sent at once were answered {came} times"
 
 
 def edges(client: Client) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 _R = 0.9806592527262586
 _A = 0.5096703736368707
 _C = 0.9284021317842834
-_SMALL, _TERMS = 0.25, 11  # of the norm of A dt: the first term left out is below 1e-16 of the first
+_NORM_MAX, _TERMS = 0.25, 11  # of the norm of A dt: the first term left out is below 1e-16 of the first
 _X_MAX = 50.0  # beyond it every exponential is 0 to double precision, and cos(inf) would raise
 
 
@@ -89,7 +89,7 @@ def copy_step(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
     exp(A dt), its integral and the integral of that are six sums of numbers. They are exact to double
     precision where A dt is small; where it is not, the matrix exponential takes over.
     """
-    if not dt * max(gain1 + 1.0, gain2 + f0) <= _SMALL:
+    if not dt * max(gain1 + 1.0, gain2 + f0) <= _NORM_MAX:
         return luenberger_copy(dt, f0, gain1, gain2)
     trace, determinant = -(gain1 + f0), gain1 * f0 + gain2
     a, b, c = 0.0, 1.0, 1.0  # A^k = a A + b I, and dt^k / k!

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
 _SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that
 _WATCH_FACTOR, _WATCH_FASTEST = 2.5, 100.0  # times the rule; rad/s
-_NOTHING = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
+_INNOVATION_MIN_RAD = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
 
 
 _Step = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
@@ -209,7 +209,7 @@ class SuperTwisting:
     def _sliding_gains(self, b: float, dt: float) -> Gains:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
         size = abs(b)
-        mu = self.mu0 if size < _NOTHING else (self.M / size) ** (1 / 3)
+        mu = self.mu0 if size < _INNOVATION_MIN_RAD else (self.M / size) ** (1 / 3)
         return _per_step(matched_gains(mu * dt), dt)
 
 

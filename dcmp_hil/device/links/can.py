@@ -35,9 +35,13 @@ FAILURES = (
 """What interfaces of python-can raise when they fail; the last two come from ports that are closed."""
 
 _NETWORKED = ("socketcand", "udp_multicast")
-_WAITING = ("robotell", "seeedstudio", "serial")  # they write without a bound: a frozen device would hold us
+_BLOCKING_INTERFACES = (
+    "robotell",
+    "seeedstudio",
+    "serial",
+)  # they write without a bound: a frozen device would hold us
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
-_DAMAGE = 0x08 | 0x10 | 0x80  # there: protocol violation, transceiver, bus error
+_DAMAGE_CLASSES = 0x08 | 0x10 | 0x80  # there: protocol violation, transceiver, bus error
 _MOST_FOREIGN = 64  # frames that are passed over in one look; a bus full of errors is no reason to stay
 _LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
 
@@ -191,7 +195,7 @@ class CanLink:
 
     def _is_damage(self, message: can.Message) -> bool:
         """Whether an error frame tells of a frame that was damaged; socketcan tells of more than that."""
-        return self._settings.interface != "socketcan" or message.arbitration_id & _DAMAGE != 0
+        return self._settings.interface != "socketcan" or message.arbitration_id & _DAMAGE_CLASSES != 0
 
     def _check_bus(self, message: can.Message) -> None:
         if message.arbitration_id & _BUS_OFF:
@@ -247,7 +251,7 @@ def _check_interface(settings: CanSettings) -> None:
             f'backend.interface: "{interface}" reaches over the network; a motor is driven from the machine '
             "that it is plugged into."
         )
-    if interface in _WAITING:
+    if interface in _BLOCKING_INTERFACES:
         raise ConfigError(
             f'backend.interface: python-can\'s "{interface}" may wait for ever in a write. On a serial line '
             'use interface = "slcan", or backend.kind = "serial".'

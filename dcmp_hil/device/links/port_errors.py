@@ -12,7 +12,7 @@ from dcmp_hil.errors import OpenError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
+_BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 
 
 def cannot_open(path: str, error: BaseException) -> OpenError:
@@ -35,7 +35,7 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
             f"{path}: you may not open it. Become a member of its group: sudo usermod -aG dialout $USER, "
             "then log out and in."
         )
-    if number in _BUSY:
+    if number in _BUSY_ERRNOS:
         by = holder(path)
         return OpenError(f"{path}: busy{f', {by} has it' if by else ''}. End that first.")
     if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):

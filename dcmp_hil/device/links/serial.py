@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 FAILURES = (serial.SerialException, OSError, termios.error, ValueError, TypeError)
 """What pyserial raises when a port fails: four unrelated types, TypeError if it was closed meanwhile."""
 
-_CHUNK = 4096
-_KEPT = 16_384  # bytes, among which another carrier shows
+_READ_BYTES = 4096
+_CARRIER_CHECK_BYTES = 16_384  # bytes, among which another carrier shows
 _DELIMITER = b"\0"
 
 
@@ -141,10 +141,10 @@ class SerialLink:
             if not self._poll.poll(1e3 * timeout):
                 self._more = False
                 return None
-            data = port.read(_CHUNK)
+            data = port.read(_READ_BYTES)
         except FAILURES as error:
             raise self._broken(error) from error
-        self._more = len(data) == _CHUNK
+        self._more = len(data) == _READ_BYTES
         frames.extend(self._receiver.feed(data))
         if self._unknown:
             self._keep_first(data)
@@ -153,7 +153,7 @@ class SerialLink:
     def _keep_first(self, data: bytes) -> None:
         """Keep what is heard until the first frame shows that the carrier is right."""
         self._first += data
-        self._unknown = not self._frames and len(self._first) < _KEPT
+        self._unknown = not self._frames and len(self._first) < _CARRIER_CHECK_BYTES
 
     def _write(self, data: bytes) -> None:
         port = self._opened()

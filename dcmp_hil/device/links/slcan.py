@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.frame import Frame
 
-_CHUNK = 4096
-_OURS = b"NDCMP\r"  # what a device of this project answers to N
-_ANSWERED = 16_384  # bytes, among which that answer is
+_READ_BYTES = 4096
+_DEVICE_NAME_ANSWER = b"NDCMP\r"  # what a device of this project answers to N
+_NAME_ANSWER_BYTES_MAX = 16_384  # bytes, among which that answer is
 _BITRATES = {
     rate: code
     for code, rate in enumerate(
@@ -95,7 +95,7 @@ class SlcanBus(can.BusABC):
         """Close the channel and the port; a device of ours goes on sending, for who only listens."""
         super().shutdown()
         with contextlib.suppress(*FAILURES):  # it is gone: that is closed
-            if _OURS not in self._first:
+            if _DEVICE_NAME_ANSWER not in self._first:
                 self._command("C")
         self._port.close()
 
@@ -107,8 +107,8 @@ class SlcanBus(can.BusABC):
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002
         if not self._frames:
-            data = self._port.read(_CHUNK)
-            if len(self._first) < _ANSWERED:
+            data = self._port.read(_READ_BYTES)
+            if len(self._first) < _NAME_ANSWER_BYTES_MAX:
                 self._first += data
             self._frames.extend(self._receiver.feed(data))
         if not self._frames:

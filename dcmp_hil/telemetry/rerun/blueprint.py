@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 TIMELINE = "loop_time"
-_WINDOW = 10.0  # s on the axis of every plot
+_WINDOW_S = 10.0  # s on the axis of every plot
 _JOINT, _VOLTAGE, _TIMING = "joint/", "control/voltage_V", "loop/timing_us"  # plots with a place of their own
 _BEYOND_LIMIT = 1.3  # so that the lines of the limit show
 
@@ -53,7 +53,7 @@ def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blu
 def plot(
     path: str,
     *,
-    window: float | None = _WINDOW,
+    window: float | None = _WINDOW_S,
     legend: bool = True,
     reach: float | None = None,
     name: str = "",

@@ -16,12 +16,12 @@ _STUCK = (
     "The viewer has taken nothing for seconds and is left behind; the run goes on. "
     "Close that viewer and open another."
 )
-_SCARCE = 100e6  # bytes free below which a disk is the likely cause
+_SCARCE_BYTES = 100e6  # bytes free below which a disk is the likely cause
 NO_ROOM = (
     "{file}: there is room for {room:.0f} kB, and a recording begins with up to {beginning:.0f} kB. Free "
     "some space, or record elsewhere (--record FILE.rrd) or not at all (--no-record)."
 )
-_SPARED = (
+_FULL_DISK_NOTE = (
     "{file} {what}: less than {needed:.3g} MB are free on its disk, and the data in run.mcap come first. "
     "The run goes on. Free some space; `dcmp-hil export FOLDER --rrd FILE` makes the dashboard afterwards."
 )
@@ -51,10 +51,10 @@ def incomplete(outlet: Outlet, reason: str) -> str:
     room = room_for(outlet.file)
     if math.isfinite(room):
         measured += f", there is room for {1e-9 * room:.1f} GB more"
-        remedy = " Free some space." if room < _SCARCE else ""
+        remedy = " Free some space." if room < _SCARCE_BYTES else ""
     return f"The recording is incomplete: {reason.rstrip('.')} ({measured}).{remedy}"
 
 
 def spared(file: Path, what: str, needed: float) -> str:
     """Say that a file, which ends or is not written, leaves so many bytes to the data of the run."""
-    return _SPARED.format(file=file, what=what, needed=1e-6 * needed)
+    return _FULL_DISK_NOTE.format(file=file, what=what, needed=1e-6 * needed)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Call = tuple[str, list[rr.TimeColumn], rr.ComponentColumnList]
 
 _POSES_PER_SECOND = 50
-_LATE = 0.5  # of a period
+_LATE_MIN_PERIODS = 0.5  # of a period
 
 
 class Frames:
@@ -153,7 +153,9 @@ class Frames:
 
     def _states(self, block: Block) -> Iterator[Call]:
         limit = self._rig.voltage_limit
-        questions = {"samples": (block["lateness"] > _LATE * self._rig.period, ("on time", "late"))}
+        questions = {
+            "samples": (block["lateness"] > _LATE_MIN_PERIODS * self._rig.period, ("on time", "late"))
+        }
         if limit is not None:
             at_limit = np.abs(block["voltage_sent"]) >= limit * (1.0 - 1e-9)
             questions["voltage"] = (at_limit, ("within limits", "at the limit"))

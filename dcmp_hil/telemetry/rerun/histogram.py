@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _BINS = 61  # odd, so that a nominal period lies in the middle of a bar
-_EVERY = 1.0  # s between two pictures of it
+_SEND_PERIOD_S = 1.0  # s between two pictures of it
 
 
 class Histogram:
@@ -35,5 +35,5 @@ class Histogram:
         self.counts += np.histogram(np.clip(known, self._edges[0], self._edges[-1]), self._edges)[0]
         if t[-1] < self._due:
             return False
-        self._due = float(t[-1]) + _EVERY
+        self._due = float(t[-1]) + _SEND_PERIOD_S
         return True

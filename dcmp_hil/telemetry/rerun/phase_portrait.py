@@ -16,20 +16,22 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
 
 PATH = "phase"
-_TRAIL = 10.0  # s
+_TRAIL_S = 10.0  # s
 _POINTS_PER_SECOND, _PICTURES_PER_SECOND = 50, 5
-_SMALLEST = 0.1  # rad and rad/s: a portrait of an arm at rest is not one of its noise
+_AXIS_MIN = 0.1  # rad and rad/s: a portrait of an arm at rest is not one of its noise
 _AXIS, _TEXT = (80, 84, 92), (150, 155, 160)
-_MARGIN = 1.12  # of the axes, for their labels
-_OVER = 1.05  # of an axis: what is a little more than 1 has no axis to 2
+_AXIS_MARGIN_RATIO = 1.12  # of the axes, for their labels
+_AXIS_OVERSHOOT_MAX = 1.05  # of an axis: what is a little more than 1 has no axis to 2
 
 Call = tuple[str, rr.ComponentColumnList]
 
 
 def round_up(value: float) -> float:
     """Return the next of 1, 2, 5 x 10^n: what an axis can end at."""
-    decade: float = 10.0 ** math.floor(math.log10(value / _OVER))
-    return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if value <= step * decade * _OVER)
+    decade: float = 10.0 ** math.floor(math.log10(value / _AXIS_OVERSHOOT_MAX))
+    return next(
+        step * decade for step in (1.0, 2.0, 5.0, 10.0) if value <= step * decade * _AXIS_OVERSHOOT_MAX
+    )
 
 
 class Portrait:
@@ -61,7 +63,7 @@ class Portrait:
         new = table[np.flatnonzero(np.diff(slots, prepend=self._slot))]
         self._slot = int(slots[-1])
         points = np.concatenate((self.points, new))
-        self.points = points[points[:, 0] > table[-1, 0] - _TRAIL]
+        self.points = points[points[:, 0] > table[-1, 0] - _TRAIL_S]
 
     def draw(self) -> tuple[float, list[Call]] | None:
         """Return time and what to send; None where the last picture is still new."""
@@ -99,7 +101,7 @@ class Portrait:
     def _find_reach(self) -> tuple[float, float]:
         """Return the ends of the axes, rad and rad/s: never smaller than before, so that nothing jitters."""
         most = np.abs(self.points[:, 1:]).max(axis=0)
-        position, velocity = max(most[0], most[2], _SMALLEST), max(most[1], most[3], _SMALLEST)
+        position, velocity = max(most[0], most[2], _AXIS_MIN), max(most[1], most[3], _AXIS_MIN)
         return max(self._reach[0], round_up(position)), max(self._reach[1], round_up(velocity))
 
     def _scaled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,7 +114,15 @@ def _axes(position: float, velocity: float) -> list[Call]:
     square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)], float)
     strips = [square, np.array([(-1.0, 0.0), (1.0, 0.0)]), np.array([(0.0, -1.0), (0.0, 1.0)])]
     lines = rr.LineStrips2D.columns(strips=strips, colors=[_AXIS] * 3, radii=[0.004] * 3).partition([3])
-    places = np.array([(-1, _MARGIN), (1, _MARGIN), (0, _MARGIN), (0, -_MARGIN)], float)
+    places = np.array(
+        [
+            (-1, _AXIS_MARGIN_RATIO),
+            (1, _AXIS_MARGIN_RATIO),
+            (0, _AXIS_MARGIN_RATIO),
+            (0, -_AXIS_MARGIN_RATIO),
+        ],
+        float,
+    )
     labels = [f"{-position:g} rad", f"{position:g} rad", f"{-velocity:g} rad/s", f"{velocity:g} rad/s"]
     names = rr.Points2D.columns(positions=places, labels=labels, colors=[_TEXT] * 4, radii=[0.001] * 4)
     return [(f"{PATH}/axes", lines), (f"{PATH}/axes/ends", names.partition([4]))]

@@ -41,7 +41,7 @@ LANES = {
 """Lanes of the timeline of states, with the colour of each state."""
 
 _WIDTHS = {TRUE: 5.0, ESTIMATE: 3.2, REFERENCE: 1.6, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
-_APART = (
+_SERIES_COLOURS = (
     *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
     *((237, 201, 72), (176, 122, 161), (255, 157, 167), (156, 117, 95), (186, 176, 172)),
 )
@@ -114,7 +114,7 @@ def _style_parameters(stream: rr.RecordingStream, rig: RigView) -> None:
     names = Parameters(rig.parameters, rig.kinds, rig.numbers).drawn
     style = rr.SeriesLines(
         names=list(names),
-        colors=[_APART[k % len(_APART)] for k in range(len(names))],
+        colors=[_SERIES_COLOURS[k % len(_SERIES_COLOURS)] for k in range(len(names))],
         widths=[1.6] * len(names),
         interpolation_mode="StepAfter",
     )

@@ -30,9 +30,9 @@ _STYLES = {
     "error": (ERROR, 1.2),
     "applied": (VOLTAGE, 1.6),
 }
-_OTHERS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT)
-_FLUSH = 30.0  # s
-_STEP = 40.0  # s for one plot
+_OTHER_COLOURS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT)
+_FLUSH_TIMEOUT_S = 30.0  # s
+_PLOT_TIMEOUT_S = 40.0  # s for one plot
 
 
 def write_series(
@@ -72,7 +72,7 @@ def write_series(
         for name, lines in plots.items():
             _send(stream, name, times, {k: v for k, v in lines.items() if not np.isnan(v).all()})
             yield
-        stream.flush(timeout_sec=_FLUSH)
+        stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
         yield
         stream.disconnect()
 
@@ -96,7 +96,7 @@ def _error_of(steps: Iterator[None]) -> Exception | None:
 
     threading.Thread(target=take, name=THREAD, daemon=True).start()
     try:
-        while (answer := answers.get(timeout=_STEP)) is True:
+        while (answer := answers.get(timeout=_PLOT_TIMEOUT_S)) is True:
             pass
     except Empty:
         return TimeoutError("the disk takes nothing any more")
@@ -108,7 +108,9 @@ def _send(
 ) -> None:
     if not lines:
         return
-    styles = [_STYLES.get(name, (_OTHERS[k % len(_OTHERS)], 1.2)) for k, name in enumerate(lines)]
+    styles = [
+        _STYLES.get(name, (_OTHER_COLOURS[k % len(_OTHER_COLOURS)], 1.2)) for k, name in enumerate(lines)
+    ]
     look = rr.SeriesLines(
         names=list(lines),
         colors=[colour for colour, _ in styles],

@@ -40,14 +40,16 @@ if TYPE_CHECKING:
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
 _SERVER_START = 60.0  # s, a far limit: that it listens is an event, and nothing is armed yet
-_CLOSING = 12.0  # s, for all of it; long enough for a window that is still opening
-_FAREWELL = 1.5  # s, for a viewer that was there before: if it is frozen, the last call never returns
+_CLOSE_TIMEOUT_S = 12.0  # s, for all of it; long enough for a window that is still opening
+_VIEWER_FLUSH_TIMEOUT_S = 1.5
+"""Seconds, for a viewer that was there before: if it is frozen, the last call never returns."""
 _FILE_PATIENCE = 30.0  # s, for a disk that is slow
-_HISTORY = "64MiB"  # of what late viewers get: two minutes at 1 kHz; what is sent once comes again
-_AGAIN = 10.0  # s
+_SERVER_MEMORY_LIMIT = "64MiB"
+"""Of what late viewers get: two minutes at 1 kHz; what is sent once comes again."""
+_RESEND_PERIOD_S = 10.0  # s
 _FILE_SPAN = 1.0  # s of a run that go into a file at once
 _VIEWER_PATIENCE = 5.0  # s, for a viewer that is
-_BEGINNING = 400e3  # bytes: scenery and layout are 250 kB
+_START_DATA_BYTES = 400e3  # bytes: scenery and layout are 250 kB
 
 
 class RerunSink:
@@ -97,7 +99,7 @@ class RerunSink:
         port: int = window.PORT,
         *,
         spare: bool = False,
-        history: str = _HISTORY,
+        history: str = _SERVER_MEMORY_LIMIT,
     ) -> None:
         self.warnings: list[str] = []
         self.port: int | None = None
@@ -137,7 +139,7 @@ class RerunSink:
     def close(self) -> None:
         """Write what is left, and give up after 12 s at most; a second call waits for the first."""
         clock = MonotonicClock()
-        end_ns = clock.now_ns() + int(_CLOSING * 1e9)
+        end_ns = clock.now_ns() + int(_CLOSE_TIMEOUT_S * 1e9)
         atexit.unregister(self.close)
         faults: list[str] = []
         self._tell(Feed.send_rest)
@@ -191,14 +193,16 @@ class RerunSink:
                 f"{record}: {error.strerror or error}. Choose a file for the recording that you may write, "
                 "in a folder that exists."
             ) from None
-        if self._needed and short_of(record, self._needed + _BEGINNING):
+        if self._needed and short_of(record, self._needed + _START_DATA_BYTES):
             record.unlink(missing_ok=True)
             self.warnings.append(spared(record, "is not written", self._needed))
             return
         room = room_for(record)
-        if room < _BEGINNING:  # Rerun waits for ever where the disk fills up while it begins
-            raise ConfigError(NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _BEGINNING))
-        outlet = Outlet(self._stream(), _FILE_PATIENCE, _CLOSING, file=record)
+        if room < _START_DATA_BYTES:  # Rerun waits for ever where the disk fills up while it begins
+            raise ConfigError(
+                NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _START_DATA_BYTES)
+            )
+        outlet = Outlet(self._stream(), _FILE_PATIENCE, _CLOSE_TIMEOUT_S, file=record)
         outlet.do(partial(warm_up, self._rig))
         # A footer would take memory for every chunk for as long as the run goes on: 25 MB a minute.
         outlet.do(partial(begin, rr.FileSink(record, write_footer=False), self._rig))
@@ -216,12 +220,12 @@ class RerunSink:
         outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
         outlet.do(partial(warm_up, self._rig))
         outlet.do(partial(begin, target, self._rig))
-        self._feeds.append(Feed(outlet, self._rig, again=_AGAIN))
+        self._feeds.append(Feed(outlet, self._rig, again=_RESEND_PERIOD_S))
         return outlet
 
     def _connect(self) -> None:
         if window.speaks_http2(window.PORT):
-            self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)), _FAREWELL)
+            self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)), _VIEWER_FLUSH_TIMEOUT_S)
             return
         self.warnings.append(
             f"No viewer answers on 127.0.0.1:{window.PORT}; the run goes on without one. "
@@ -243,7 +247,7 @@ class RerunSink:
         """Let viewers come and go; who comes late gets what there was."""
         for port in window.free_ports(first_port):
             target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
-            outlet = self._open_viewer(target, _CLOSING)
+            outlet = self._open_viewer(target, _CLOSE_TIMEOUT_S)
             if window.serves(port, os.getpid(), _SERVER_START):
                 self.port = port
                 return outlet

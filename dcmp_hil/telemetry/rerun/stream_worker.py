@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 THREAD = "rerun"
 """Name of the threads: one that is still there after `close` is stuck for good."""
-_WAITING = 32  # jobs; 3 s of a run in real time
-_LOOK = 0.05  # s
-_FLUSH = 5.0  # s
-_STALL = 4.0  # s that a file does not grow in a run while it is flushed
-_FULL_STALL = 1.5  # s where there is no room: that flush may wait for ever
-_ROOM = 1 << 20  # bytes
+_JOBS_MAX = 32  # jobs; 3 s of a run in real time
+_POLL_PERIOD_S = 0.05  # s
+_FLUSH_TIMEOUT_S = 5.0  # s
+_STALL_TIMEOUT_S = 4.0  # s that a file does not grow in a run while it is flushed
+_FULL_DISK_STALL_TIMEOUT_S = 1.5  # s where there is no room: that flush may wait for ever
+_FREE_BYTES_MIN = 1 << 20  # bytes
 
 
 def _no_farewell() -> None:
@@ -68,7 +68,7 @@ class Outlet:
             with suppress(OSError):
                 self._opened = os.open(file, os.O_RDONLY)
                 weakref.finalize(self, os.close, self._opened)
-        self._jobs: Queue[Job | None] = Queue(_WAITING)
+        self._jobs: Queue[Job | None] = Queue(_JOBS_MAX)
         self._error: Exception | None = None
         self._clock = MonotonicClock()
         self._began_ns = self._grew_ns = 0  # the job at hand, 0 for none; when the file was seen to grow
@@ -97,7 +97,9 @@ class Outlet:
     def _stalls(self, patience: float) -> bool:
         stalled = self.stalled
         return stalled > patience or (
-            stalled > _FULL_STALL and self.file is not None and room_for(self.file) < _ROOM
+            stalled > _FULL_DISK_STALL_TIMEOUT_S
+            and self.file is not None
+            and room_for(self.file) < _FREE_BYTES_MIN
         )
 
     def do(self, job: Job) -> bool:
@@ -109,7 +111,7 @@ class Outlet:
             The exception that an earlier job raised.
         """
         self._raise_what_was_raised()
-        if self._stalls(_STALL):
+        if self._stalls(_STALL_TIMEOUT_S):
             return False
         try:
             self._jobs.put(job, timeout=self._patience)
@@ -129,8 +131,8 @@ class Outlet:
         done = threading.Event()
         if not self.do(lambda _: done.set()):
             return False
-        while not done.wait(_LOOK):
-            if self._stalls(_STALL) or self._clock.now_ns() >= end_ns:
+        while not done.wait(_POLL_PERIOD_S):
+            if self._stalls(_STALL_TIMEOUT_S) or self._clock.now_ns() >= end_ns:
                 return False
         self._raise_what_was_raised()
         return True
@@ -154,7 +156,7 @@ class Outlet:
             while (
                 not self._ended.is_set() and not self._stalls(self._ending) and self._clock.now_ns() < end_ns
             ):
-                self._ended.wait(min(_LOOK, max(0, end_ns - self._clock.now_ns()) * 1e-9))
+                self._ended.wait(min(_POLL_PERIOD_S, max(0, end_ns - self._clock.now_ns()) * 1e-9))
         self._raise_what_was_raised()
         if self.file is not None and not self._ended.is_set():
             stalled = self.stalled
@@ -175,13 +177,13 @@ class Outlet:
             try:
                 job(self._stream)
                 if self.file is not None:
-                    self._stream.flush(timeout_sec=_FLUSH)
+                    self._stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
             except Exception as error:  # noqa: BLE001 - raised to the caller of the next job
                 self._error = error
             self._began_ns = 0
         self._began_ns = self._clock.now_ns()
         try:
-            self._stream.flush(timeout_sec=_FLUSH)
+            self._stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
         except Exception as error:  # noqa: BLE001 - a full disk or a frozen viewer
             self._error = error if self.file is not None else self._error
             self._ended.set()

@@ -21,15 +21,24 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 PORT, WEB_PORT = 9876, 9090
 _PORTS_TRIED = 50
-_BUSY = 3.0  # s that a server may take on a busy computer; a port without a listener refuses at once
-_LINGER = 10.0  # s; a window takes a second or two to open, and a run in virtual time may be over by then
+_ANSWER_TIMEOUT_S = 3.0
+"""Seconds that a server may take on a busy computer; a port without a listener refuses at once."""
+_FETCH_TIMEOUT_S = 10.0
+"""Seconds; a window takes a second or two to open, and a run in virtual time may be over by then."""
 _CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
 _ESTABLISHED, _LISTENING = "01", "0A"  # in there
-_HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))  # with empty settings
-_SETTINGS = b"\x04"  # type of the frame that every HTTP/2 server answers with
-_NOWHERE = "http://127.0.0.1:9"  # the port that discards; no server listens there
-_QUIET = {"CI": "1", "RERUN_ANALYTICS": "0", "HTTPS_PROXY": _NOWHERE, "https_proxy": _NOWHERE}
+_HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(
+    (0, 0, 0, 4, 0, 0, 0, 0, 0)
+)  # with empty settings
+_HTTP2_SETTINGS_TYPE = b"\x04"  # type of the frame that every HTTP/2 server answers with
+_CLOSED_PORT_URL = "http://127.0.0.1:9"  # the port that discards; no server listens there
+_OFFLINE_ENVIRONMENT = {
+    "CI": "1",
+    "RERUN_ANALYTICS": "0",
+    "HTTPS_PROXY": _CLOSED_PORT_URL,
+    "https_proxy": _CLOSED_PORT_URL,
+}
 """The viewer asks no server: neither for analytics nor, which has no switch, for a newer version."""
 
 
@@ -118,15 +127,15 @@ def answers(port: int, within: float) -> bool:
             return True
 
 
-def speaks_http2(port: int, within: float = _BUSY) -> bool:
+def speaks_http2(port: int, within: float = _ANSWER_TIMEOUT_S) -> bool:
     """Tell whether a server answers on `port`, as a viewer does; one that is frozen only accepts."""
     try:
         with socket.create_connection((LOOPBACK, port), timeout=within) as connection:
-            connection.sendall(_HELLO)
+            connection.sendall(_HTTP2_PREFACE)
             header = connection.recv(9)
     except OSError:
         return False
-    return header[3:4] == _SETTINGS
+    return header[3:4] == _HTTP2_SETTINGS_TYPE
 
 
 def viewer_binary() -> Path:
@@ -139,7 +148,7 @@ def viewer_binary() -> Path:
 
 def viewer_environment() -> dict[str, str]:
     """Return this environment, changed so that a viewer makes no request to the Internet."""
-    return {**os.environ, **_QUIET}
+    return {**os.environ, **_OFFLINE_ENVIRONMENT}
 
 
 def start_viewer(port: int) -> subprocess.Popen[bytes]:
@@ -197,7 +206,7 @@ def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
     if not _CONNECTIONS.exists():  # not Linux: it cannot be found out
         return
     clock = MonotonicClock()
-    end_ns = clock.now_ns() + int(_LINGER * 1e9)
+    end_ns = clock.now_ns() + int(_FETCH_TIMEOUT_S * 1e9)
     quiet = 0
     while quiet < _CAUGHT_UP and clock.now_ns() < end_ns and viewer.poll() is None:
         unsent = _unsent(port)
