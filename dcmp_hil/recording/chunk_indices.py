@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _PACKED = struct.Struct("<5Q4q")
 _COLUMNS = _PACKED.size // 8
-_FIRST, _LAST, _START, _LENGTH, _INDEXED, _COMPRESSED = range(6)
+_FIRST_TIME, _LAST_TIME, _START, _LENGTH, _INDEXED, _COMPRESSED = range(6)
 _OFFSETS = slice(7, 9)  # of the index of each channel, from the beginning of the chunk
 _BLOCK = 512  # chunks: 15 s at 1 kHz
 _ABSENT = 0
@@ -100,8 +100,8 @@ def _pressed(packed: bytearray) -> bytes:
     rows = np.frombuffer(bytes(packed), np.int64).reshape(-1, _COLUMNS).copy()
     rows[:, _OFFSETS] -= rows[:, [_LENGTH]]
     rows[:, _LENGTH] -= rows[:, _COMPRESSED]
-    rows[:, _LAST] -= rows[:, _FIRST]
-    rows[1:, _FIRST] = np.diff(rows[:, _FIRST])
+    rows[:, _LAST_TIME] -= rows[:, _FIRST_TIME]
+    rows[1:, _FIRST_TIME] = np.diff(rows[:, _FIRST_TIME])
     size = rows[:, _LENGTH] + rows[:, _COMPRESSED] + rows[:, _INDEXED]  # of a chunk and its index
     rows[1:, _START] = np.diff(rows[:, _START]) - size[:-1]
     return zlib.compress(rows.T.tobytes())
@@ -114,8 +114,8 @@ def _unpressed(block: bytes) -> bytes:
     size = rows[:, _LENGTH] + rows[:, _COMPRESSED] + rows[:, _INDEXED]
     rows[1:, _START] += size[:-1]
     rows[:, _START] = np.cumsum(rows[:, _START])
-    rows[:, _FIRST] = np.cumsum(rows[:, _FIRST])
-    rows[:, _LAST] += rows[:, _FIRST]
+    rows[:, _FIRST_TIME] = np.cumsum(rows[:, _FIRST_TIME])
+    rows[:, _LAST_TIME] += rows[:, _FIRST_TIME]
     rows[:, _LENGTH] += rows[:, _COMPRESSED]
     rows[:, _OFFSETS] += rows[:, [_LENGTH]]
     return rows.tobytes()

@@ -47,7 +47,11 @@ _END_TIMEOUT_S = 2.0  # s that the end of a run takes at most
 _EXIT_TIMEOUT_S = 12.0  # s that the end of this process takes at most, for a window that is still opening
 _EVENTS_MAX = 10_000
 _EVENT_TEXT_CHARS_MAX = 10_000  # characters of an event's text that are sent
-_MALLOC_ENVIRONMENT = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "131072", "MIMALLOC_PURGE_DELAY": "0"}
+_MALLOC_ENVIRONMENT = {
+    "MALLOC_ARENA_MAX": "1",
+    "MALLOC_MMAP_THRESHOLD_": "131072",
+    "MIMALLOC_PURGE_DELAY": "0",
+}
 """One heap for all threads, and large pieces outside it: a heap for each thread holds a third more.
 
 Rerun's allocator gives free pages back at once and not after a second: it holds 7 MB instead of 22 MB.
