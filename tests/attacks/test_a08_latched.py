@@ -33,7 +33,7 @@ from dcmp_hil.wire.messages import (
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.contract.benches import Bench, on_bench
 from tests.contract.hooks import on_way_down
-from tests.contract.test_hostile_answers import lying
+from tests.contract.lies import lying
 from tests.firmware.core_library import compiler
 from tests.helpers import bench as bench_rig
 from tests.live.processes import until

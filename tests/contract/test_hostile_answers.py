@@ -1,4 +1,4 @@
-"""What a device says is checked before it is used: no answer leads to a traceback, a STOP or a live motor."""
+"""What a device says is checked before it is used: no answer leads to an armed motor."""
 
 from __future__ import annotations
 
@@ -7,96 +7,31 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.errors import ConfigError, OpenError
-from dcmp_hil.values import Fault
-from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import (
-    Drive,
-    FaultReport,
     Identity,
     Parameter,
-    ParameterValue,
     SampleReport,
     State,
-    Stop,
-    StopReason,
 )
 from tests.contract.benches import on_bench
 from tests.contract.driving import at_rest, drive
 from tests.contract.hooks import on_way_down
-from tests.firmware.core_library import compiler
+from tests.contract.lies import SHORT_BOOT_WAIT, at_first, every, forgets, lying, says
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
-    from tests.contract.benches import Bench
 
     Lie = Callable[[Message], Message | None]
 
-_INT = 2**31 - 1
-_FAST = "backend.boot_wait_s=0.5"
+pytestmark = pytest.mark.usefixtures("needs_compiler")
 
-
-@pytest.fixture(scope="module", autouse=True)
-def needs_compiler() -> None:
-    compiler()
-
-
-def lying(lie: Lie) -> Callable[[list[Frame]], list[Frame]]:
-    """Pass every message of the device through `lie`; what becomes None is not sent."""
-
-    def change(frames: list[Frame]) -> list[Frame]:
-        told = (lie(unpack(frame)) for frame in frames)  # type: ignore[arg-type]
-        return [pack(message) for message in told if message is not None]
-
-    return change
-
-
-def says(parameter: Parameter, value: int, result: int = 0) -> Lie:
-    def lie(message: Message) -> Message:
-        if isinstance(message, ParameterValue) and message.id == parameter:
-            return ParameterValue(parameter, value, result)
-        return message
-
-    return lie
-
-
-def at_first(parameter: Parameter, value: int) -> Lie:
-    """Say a value until another is set: the first answer is the comparison's."""
-    left = [1]
-
-    def lie(message: Message) -> Message:
-        if isinstance(message, ParameterValue) and message.id == parameter and left:
-            left.pop()
-            return ParameterValue(parameter, value, 0)
-        return message
-
-    return lie
-
-
-def forgets(parameter: Parameter, value: int, answers: int) -> Lie:
-    """Say another value after so many answers about the parameter: what was set is not kept."""
-    heard = [0]
-
-    def lie(message: Message) -> Message:
-        if isinstance(message, ParameterValue) and message.id == parameter:
-            heard[0] += 1
-            if heard[0] > answers:
-                return ParameterValue(parameter, value, 0)
-        return message
-
-    return lie
-
-
-def every(kind: type, **fields: int | bool) -> Lie:
-    return lambda message: message._replace(**fields) if isinstance(message, kind) else message  # type: ignore[arg-type]
-
-
+INT32_MAX = 2**31 - 1
 _IMPOSSIBLE = [
-    *((Parameter.COUNTS_PER_REV, value) for value in (0, -1, -(2**31), _INT)),
-    *((Parameter.PERIOD_US, value) for value in (0, -1, -(2**31), _INT, 1)),
-    *((Parameter.VOLTAGE_LIMIT_MV, value) for value in (0, -1, -(2**31), _INT)),
+    *((Parameter.COUNTS_PER_REV, value) for value in (0, -1, -(2**31), INT32_MAX)),
+    *((Parameter.PERIOD_US, value) for value in (0, -1, -(2**31), INT32_MAX, 1)),
+    *((Parameter.VOLTAGE_LIMIT_MV, value) for value in (0, -1, -(2**31), INT32_MAX)),
     *((Parameter.SLEW_MV_PER_MS, value) for value in (-1, -(2**31))),
     *((Parameter.SPEED_LIMIT_COUNTS_S, value) for value in (0, -1, -(2**31))),
     *((Parameter.TRAVEL_LIMIT_COUNTS, value) for value in (0, -1, -(2**31))),
@@ -130,7 +65,7 @@ _ROWS: list[tuple[str, Lie, str]] = [
 @pytest.mark.sampled
 @pytest.mark.parametrize(("lie", "words"), [row[1:] for row in _ROWS], ids=[row[0] for row in _ROWS])
 def test_an_answer_that_cannot_be_is_a_sentence_and_leaves_the_device_free(lie: Lie, words: str) -> None:
-    with on_bench("sim-board can", _FAST) as bench:
+    with on_bench("sim-board can", SHORT_BOOT_WAIT) as bench:
         on_way_down(bench, lying(lie))
         with pytest.raises((OpenError, ConfigError), match=words) as caught:
             bench.make().__enter__()
@@ -228,120 +163,3 @@ def test_a_slew_that_the_rig_does_not_know_is_remarked() -> None:
         with bench.device() as backend:
             (remark,) = backend.remarks
     assert "100 V/s" in remark
-
-
-# -------------------------------------------------------------------------------------------- clearing
-
-
-def commands(bench: Bench, lose: Callable[[Drive, int], bool] = lambda *_: False) -> list[Drive]:
-    """Watch the DRIVEs on their way to the board; `lose` some, by what they say and how many came before."""
-    heard: list[Drive] = []
-    receive = bench.board.receive_frame
-
-    def watch(number: int, data: bytes) -> None:
-        message = unpack((number, data))
-        if isinstance(message, Drive):
-            heard.append(message)
-            if lose(message, len(heard) - 1):
-                return
-        receive(number, data)
-
-    bench.board.receive_frame = watch  # type: ignore[method-assign]
-    return heard
-
-
-def stopped(bench: Bench) -> None:
-    """Leave the board in FAULT."""
-    bench.board.tick()
-    bench.board.receive_frame(*pack(Stop(StopReason.SUPERVISOR)))
-    assert bench.board.state == State.FAULT
-
-
-@pytest.mark.parametrize("lost", [{0}, {1}, {0, 1}, {1, 3, 5}, {0, 2, 3, 4, 7}, set(range(20))])
-def test_a_fault_is_cleared_though_commands_are_lost(lost: set[int]) -> None:
-    with on_bench("sim-board can") as bench:
-        stopped(bench)
-        heard = commands(bench, lambda _, count: count in lost)
-        with bench.device() as backend:
-            assert "STOPPED" in backend.described
-            drive(backend, 1.0, 3)
-    clears = [drive.clear for drive in heard[: 1 + max(lost)]]
-    assert clears == [bool(k % 2) for k in range(len(clears))]
-
-
-def test_a_fault_that_stays_is_given_up_after_half_a_second() -> None:
-    with on_bench("sim-board can") as bench:
-        stopped(bench)
-        heard = commands(bench, lambda said, _: said.clear)
-        before = bench.board.tick_count
-        with pytest.raises(OpenError, match="stays in fault STOPPED"):
-            bench.make().__enter__()
-        assert 400 <= len([said for said in heard if not said.release]) <= 502
-        assert bench.board.tick_count - before < 1000
-        assert bench.board.state == State.FAULT
-
-
-@pytest.mark.parametrize("code", [2, 8, 9, 77])
-def test_another_fault_in_its_place_is_not_cleared(code: int) -> None:
-    with on_bench("sim-board can") as bench:
-        stopped(bench)
-        heard = commands(bench, lambda said, _: said.clear)
-
-        def lie(message: Message) -> Message:
-            if len(heard) >= 4 and isinstance(message, FaultReport):
-                return message._replace(code=code)
-            if len(heard) >= 4 and isinstance(message, SampleReport) and message.state == State.FAULT:
-                return message._replace(fault_class=min(code, 7))
-            return message
-
-        on_way_down(bench, lying(lie))
-        with pytest.raises(OpenError, match="fell into"):
-            bench.make().__enter__()
-        assert len([said for said in heard if not said.release]) <= 5
-        assert bench.board.state == State.FAULT
-
-
-# ----------------------------------------------------------------------------------------- two devices
-
-
-@pytest.mark.parametrize("first_tick", [0, 100, 1000])
-def test_second_device_that_is_plugged_in_during_a_run_is_told_as_that(first_tick: int) -> None:
-    with (
-        on_bench("sim-board can") as bench,
-        on_bench("sim-board can", first_tick=first_tick) as other,
-        bench.device() as backend,
-    ):
-        drive(backend, 1.0, 50)
-        send = bench.board.transmit_frames
-
-        def both() -> list[Frame]:
-            other.board.tick()
-            return send() + other.board.transmit_frames()
-
-        bench.board.transmit_frames = both  # type: ignore[method-assign]
-        faults = [sample.fault for sample in drive(backend, 1.0, 3)]
-        assert faults[-1] == Fault.TWO_DEVICES
-
-
-def test_device_that_is_reset_is_not_two() -> None:
-    with on_bench("sim-board can") as bench, bench.device() as backend:
-        drive(backend, 1.0, 50)
-        bench.board.reset()
-        assert drive(backend, 1.0, 3)[-1].fault == Fault.DISARMED
-
-
-def test_two_devices_with_one_node_are_told_as_that() -> None:
-    with on_bench("sim-board can", _FAST) as bench, on_bench("sim-board can", first_tick=100) as other:
-        send = bench.board.transmit_frames
-
-        def both() -> list[Frame]:
-            frames = send()
-            if frames:
-                other.board.tick()
-                frames += other.board.transmit_frames()
-            return frames
-
-        bench.board.transmit_frames = both  # type: ignore[method-assign]
-        with pytest.raises(OpenError, match="two devices send as node 0"):
-            bench.make().__enter__()
-        assert bench.board.state == State.IDLE
