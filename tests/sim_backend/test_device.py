@@ -1,25 +1,16 @@
-"""The virtual device: a process behind a pseudo terminal, in plant time where that is possible."""
+"""The virtual device: a process behind a pseudo terminal, in plant time and in wall time."""
 
 from __future__ import annotations
 
 import math
-import os
-import select
-import signal
-from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.device.factory import open_backend
-from dcmp_hil.errors import ConfigError, LinkError, OpenError
-from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Fault
-from dcmp_hil.wire import cobs, slcan
-from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import (
-    Drive,
     Health,
     Hello,
     Parameter,
@@ -33,90 +24,21 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.contract.benches import PatientClock
 from tests.helpers import bench
+from tests.sim_backend.terminal import PATIENT_MS, PATIENT_S, SESSION, arm, connected
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from dcmp_hil.wire.messages import Message
 
 pytestmark = pytest.mark.usefixtures("needs_compiler")
 
-SESSION = 0x4321
-_PATIENT = 5.0  # s, wall: how long a test waits for what must come
-_PATIENT_MS = 5000
 _STILL = ("model.eta_rad_s2=0.0", "model.eta_amplitude_rad_s2=0.0")  # no disturbance that depends on the time
-
-
-class Terminal:
-    """The host's end of a port."""
-
-    def __init__(self, path: str, carrier: str = "cobs") -> None:
-        self._file = os.open(path, os.O_RDWR | os.O_NOCTTY)
-        self._encode = cobs.encode if carrier == "cobs" else slcan.encode
-        self.receiver = cobs.Receiver() if carrier == "cobs" else slcan.Receiver()
-        self.seq = 0
-
-    def close(self) -> None:
-        os.close(self._file)
-
-    def write(self, data: bytes) -> None:
-        os.write(self._file, data)
-
-    def read(self, seconds: float = _PATIENT) -> bytes:
-        ready, _, _ = select.select([self._file], [], [], seconds)
-        return os.read(self._file, 65536) if ready else b""
-
-    def say(self, message: Message) -> None:
-        self.write(self._encode(pack(message, 0)))
-
-    def hear(self, seconds: float = _PATIENT) -> list[Message | None]:
-        """Return messages, at least one if any comes."""
-        found: list[Message | None] = []
-        while not found and (data := self.read(seconds)):
-            found = [unpack(frame, 0) for frame in self.receiver.feed(data)]
-        return found
-
-    def drive(self, voltage_mV: int, *, arm: bool = True) -> None:
-        self.say(Drive(voltage_mV, self.seq, arm, False, False, SESSION, 20))
-
-
-@contextmanager
-def connected(device: VirtualDevice, carrier: str = "cobs") -> Iterator[Terminal]:
-    """Open the port of a device, and close it."""
-    terminal = Terminal(device.port, carrier)
-    try:
-        yield terminal
-    finally:
-        terminal.close()
-
-
-def arm(device: VirtualDevice, host: Terminal, voltage_mV: int = 2000) -> None:
-    """Arm a device whose ticks this test makes, until its voltage is applied."""
-    device.run_ticks(2)
-    host.say(Hello(SESSION, PROTOCOL_HASH))
-    for k in range(40):
-        host.seq = device.tick_count - 1
-        host.drive(voltage_mV if device.output.state == State.RUN else 0)
-        heard = host.hear()
-        device.run_ticks(1)
-        assert heard, f"nothing heard at tick {k}"
-        if device.output.voltage_mV == voltage_mV:
-            return
-    raise AssertionError(f"not armed: {device.output}")
-
-
-@pytest.fixture
-def device() -> Iterator[VirtualDevice]:
-    """Return a device whose time passes when the test says so, however long that takes."""
-    with VirtualDevice(bench(), clock=SimulatedClock()) as made:
-        yield made
 
 
 def closed_loop(carrier: str) -> tuple[list[tuple[float, float, float]], int]:
     """Run a host against a device in plant time; return what the host saw."""
     rig = bench(*_STILL)
     seen = []
-    with VirtualDevice(rig, link=carrier, patience_ms=_PATIENT_MS) as device:
+    with VirtualDevice(rig, link=carrier, patience_ms=PATIENT_MS) as device:
         way = (
             ("backend.kind=serial", f"backend.port={device.port}")
             if carrier == "cobs"
@@ -142,7 +64,7 @@ def test_same_run_is_the_same_to_the_bit_over_every_carrier() -> None:
 
 def test_answer_to_an_earlier_sample_is_none_to_the_newest() -> None:
     """Else a host that was late once while it armed is one tick behind for a whole run."""
-    with VirtualDevice(bench(), patience_ms=_PATIENT_MS) as device, connected(device) as host:
+    with VirtualDevice(bench(), patience_ms=PATIENT_MS) as device, connected(device) as host:
         device.start()
         host.say(Hello(SESSION, PROTOCOL_HASH))
         for _ in range(100):
@@ -174,7 +96,7 @@ def test_host_that_hangs_up_leaves_0_V_within_2_ms_of_the_firmware_s_clock(devic
 def test_hang_up_is_told_without_a_tick(device: VirtualDevice) -> None:
     with connected(device) as host:
         arm(device, host)
-    assert device.wait_for_change(_PATIENT)
+    assert device.wait_for_change(PATIENT_S)
     assert device.output.unasked
     assert (device.output.voltage_mV, device.output.enable, device.output.fault) == (0, 0, Fault.LINK_DOWN)
     assert 0 <= device.output.since_us - device.now_us <= 1000  # its clock runs on, at most one period
@@ -185,11 +107,11 @@ def test_stop_and_disarming_act_between_two_ticks(device: VirtualDevice) -> None
         arm(device, host)
         host.seq = device.tick_count - 1
         host.drive(2000, arm=False)
-        assert device.wait_for_change(_PATIENT)
+        assert device.wait_for_change(PATIENT_S)
         assert (device.output.voltage_mV, device.output.state) == (0, State.IDLE)
         arm(device, host)
         host.say(Stop(3))
-        assert device.wait_for_change(_PATIENT)
+        assert device.wait_for_change(PATIENT_S)
         assert (device.output.voltage_mV, device.output.fault) == (0, Fault.STOPPED)
         before = device.truth().position
         device.run_ticks(1)
@@ -293,94 +215,3 @@ def test_clock_of_the_firmware_wraps_unseen() -> None:
                 device.run_ticks(1)
         assert device.now_us < 100_000
         assert device.log[-1].state == State.RUN
-
-
-def is_running(pid: int) -> bool:
-    return Path(f"/proc/{pid}").exists()
-
-
-def test_process_is_gone_with_the_device() -> None:
-    with VirtualDevice(bench(), clock=SimulatedClock()) as device:
-        device.run_ticks(3)
-        pid, port = device.pid, device.port
-        assert is_running(pid)
-        assert os.isatty(os.open(port, os.O_RDWR | os.O_NOCTTY))
-    assert not is_running(pid)
-    with pytest.raises(LinkError, match="not running"):
-        device.run_ticks(1)
-
-
-def test_process_that_hangs_is_ended_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim_backend.board.virtual_device._END_S", 0.1)
-    with VirtualDevice(bench(), clock=SimulatedClock()) as device:
-        pid = device.pid
-        os.kill(pid, signal.SIGSTOP)
-    assert not is_running(pid)
-
-
-def test_process_that_ends_by_itself_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    with VirtualDevice(bench(), clock=SimulatedClock()) as device:
-        os.kill(device.pid, signal.SIGKILL)
-        with pytest.raises(LinkError, match="has ended"):
-            device.run_ticks(10)
-    monkeypatch.setattr("sim_backend.board.virtual_device._ANSWER_S", 0.05)
-    with VirtualDevice(bench(), clock=SimulatedClock()) as device:
-        os.kill(device.pid, signal.SIGSTOP)
-        with pytest.raises(LinkError, match="does not answer"):
-            device.run_ticks(1)
-        os.kill(device.pid, signal.SIGCONT)
-
-
-def test_thread_that_cannot_go_on_says_why() -> None:
-    with VirtualDevice(bench()) as device:
-        device.start()
-        os.kill(device.pid, signal.SIGKILL)
-        deadline_ns = MonotonicClock().now_ns() + int(1e9 * _PATIENT)
-        while device.error is None and MonotonicClock().now_ns() < deadline_ns:
-            pass
-        assert isinstance(device.error, LinkError)
-
-
-def test_closed_port_costs_no_time_of_the_processor(device: VirtualDevice) -> None:
-    with connected(device):
-        device.run_ticks(1)
-    assert not device.wait_for_change(0.5)
-    fields = Path(f"/proc/{device.pid}/stat").read_text().rsplit(")", 1)[1].split()
-    assert int(fields[11]) + int(fields[12]) < 0.2 * os.sysconf("SC_CLK_TCK")
-
-
-def test_wall_clock_paces_it() -> None:
-    clock = MonotonicClock()
-    with VirtualDevice(bench(), clock=clock) as device:
-        began_ns = clock.now_ns()
-        device.run_ticks(101)
-        assert clock.now_ns() - began_ns >= 100e6
-
-
-def test_symlink_leads_to_the_port_while_there_is_one(tmp_path: Path) -> None:
-    link = tmp_path / "port"
-    link.symlink_to("/dev/pts/of-a-run-that-crashed")
-    with VirtualDevice(bench(), symlink=link) as device:
-        assert str(link.readlink()) == device.port
-    assert not link.is_symlink()
-
-
-def test_file_is_never_taken_for_a_symlink(tmp_path: Path) -> None:
-    link = tmp_path / "port"
-    link.write_text("mine")
-    device = VirtualDevice(bench(), symlink=link)
-    with pytest.raises(ConfigError, match="--symlink"):
-        device.__enter__()
-    assert link.read_text() == "mine"
-    assert device.pid == 0
-
-
-def test_program_that_does_not_start_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    program = tmp_path / "program"
-    monkeypatch.setattr("sim_backend.board.build.program", lambda: program)
-    program.write_text("#!/bin/sh\necho no terminal left >&2; exit 3\n")
-    with pytest.raises(OpenError, match="XDG_CACHE_HOME"):
-        VirtualDevice(bench()).__enter__()
-    program.chmod(0o755)
-    with pytest.raises(OpenError, match="no terminal left"):
-        VirtualDevice(bench()).__enter__()
