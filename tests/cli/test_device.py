@@ -15,19 +15,14 @@ from typing import TYPE_CHECKING
 import can
 import pytest
 
-from tests.firmware.core_library import compiler
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from tests.cli.conftest import Outcome
 
+pytestmark = pytest.mark.usefixtures("needs_compiler")
+
 _BOUND = 60.0  # s: generous, these machines are shared
-
-
-@pytest.fixture(scope="module", autouse=True)
-def needs_compiler() -> None:
-    compiler()
 
 
 @contextmanager

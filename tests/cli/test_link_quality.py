@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.firmware.core_library import compiler
-
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
@@ -18,12 +16,9 @@ if TYPE_CHECKING:
 
     Run = Callable[..., Finished | Outcome]
 
+pytestmark = pytest.mark.usefixtures("needs_compiler")
+
 BOARD = "backend.kind=sim-board"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def needs_compiler() -> None:
-    compiler()
 
 
 def fly(

@@ -1,12 +1,10 @@
-"""`dcmp-hil ports` and `monitor`, against boards behind pseudo terminals."""
+"""`dcmp-hil ports`, and what it shares with `monitor`, at boards behind pseudo terminals and on buses."""
 
 from __future__ import annotations
 
 import itertools
 import os
-import re
 import shlex
-import signal
 import subprocess
 import sys
 import threading
@@ -17,18 +15,16 @@ import pytest
 
 from dcmp_hil.config import load_rig
 from dcmp_hil.config.backends import Can, Serial
-from dcmp_hil.device.factory import open_backend
 from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.messages import SampleReport, State
 from sim_backend.board.board import Board
 from tests.backends.line import line
+from tests.cli.ports import SAMPLE
 from tests.cli.test_wire_errors import device, only_line, path_of
-from tests.contract.benches import PatientClock, on_bench
+from tests.contract.benches import on_bench
 from tests.contract.driving import drive
 from tests.contract.pump import Pump, VirtualBus
-from tests.firmware.core_library import compiler
 from tests.helpers import bench
 
 if TYPE_CHECKING:
@@ -39,10 +35,7 @@ if TYPE_CHECKING:
 
     Cli = Callable[..., Outcome]
 
-
-@pytest.fixture(scope="module", autouse=True)
-def needs_compiler() -> None:
-    compiler()
+pytestmark = pytest.mark.usefixtures("needs_compiler")
 
 
 @pytest.mark.parametrize("carrier", ["cobs", "slcan"])
@@ -122,12 +115,11 @@ def test_ports_finds_the_device_after_a_run(cli: Cli, carrier: str) -> None:
     assert "node 0, firmware 0.1" in outcome.out
 
 
-_SAMPLE = SampleReport(0, 0, 7, State.IDLE, missed=True, limited=False, fault_class=0)
 _FOREIGN = {
     "silence": b"",
     "text": b"$GPGGA,123519,4807.038,N*47\r\n",
-    "one sample again and again": cobs.encode(pack(_SAMPLE)),
-    "one slcan sample again and again": slcan.encode(pack(_SAMPLE)),
+    "one sample again and again": cobs.encode(pack(SAMPLE)),
+    "one slcan sample again and again": slcan.encode(pack(SAMPLE)),
 }
 
 
@@ -138,24 +130,6 @@ def test_ports_writes_nothing_where_no_device_is_heard(cli: Cli, said: bytes) ->
         assert far.heard() == b""
     assert outcome.code == 0
     assert "--set" not in outcome.out
-
-
-@pytest.mark.parametrize("carrier", ["cobs", "slcan"])
-def test_monitor_writes_nothing(cli: Cli, carrier: str) -> None:
-    said = (cobs if carrier == "cobs" else slcan).encode(pack(_SAMPLE))
-    with line(said) as far:
-        outcome = cli("monitor", "--duration", "0.3", *_way_to(far.path, carrier))
-        assert far.heard() == b""
-    assert "Sample" in outcome.out
-
-
-def _way_to(path: str, carrier: str) -> list[str]:
-    where = {
-        "cobs": ("backend.kind=serial", f"backend.port={path}"),
-        "slcan": ("backend.kind=can", "backend.interface=slcan", f"backend.channel={path}"),
-    }
-    rig = {"cobs": "bench-serial", "slcan": "bench-can"}
-    return [rig[carrier], *(word for key in where[carrier] for word in ("--set", key))]
 
 
 def commands(outcome: Outcome) -> list[Rig]:
@@ -220,7 +194,7 @@ def test_ports_and_monitor_notice_two_devices_with_one_node(
         with can.Bus(channel=channel, interface="virtual", ignore_config=True) as bus:
             for tick in itertools.count():
                 for other in (0, 90):
-                    number, data = pack(_SAMPLE._replace(tick=(tick + other) % 256), 5)
+                    number, data = pack(SAMPLE._replace(tick=(tick + other) % 256), 5)
                     bus.send(can.Message(arbitration_id=number, data=data, is_extended_id=False))
                 if ending.wait(2e-3):
                     return
@@ -284,77 +258,3 @@ def test_ports_and_monitor_close_what_could_not_be_opened(cli: Cli, monkeypatch:
     closed.clear()
     assert cli("monitor").code == 3
     assert closed
-
-
-def test_monitor_counts_what_was_damaged_on_slcan(cli: Cli) -> None:
-    with line(b"t04\r") as far:
-        outcome = cli("monitor", "--duration", "0.3", *_way_to(far.path, "slcan"))
-    assert outcome.code == 0
-    found = re.search(r"0 messages, (\d+) damaged", outcome.err)
-    assert found is not None, outcome.err
-    assert int(found[1]) > 0
-
-
-@pytest.mark.parametrize(
-    ("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
-)
-def test_monitor_ends_with_the_code_of_its_signal(number: signal.Signals, code: int) -> None:
-    with line(cobs.encode(pack(_SAMPLE))) as far:
-        command = [sys.executable, "-m", "dcmp_hil", "monitor", *_way_to(far.path, "cobs")]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-            assert process.stdout is not None
-            process.stdout.readline()  # it is listening
-            process.send_signal(number)
-            _, err = process.communicate(timeout=30)
-    assert process.returncode == code, err
-
-
-def test_monitor_shows_samples_ten_times_a_second_or_all(cli: Cli) -> None:
-    with device() as pump:
-        where = ("monitor", "bench-serial", "--set", f"backend.port={path_of(pump)}", "--duration", "0.5")
-        brief, everything = cli(*where), cli(*where, "--all")
-        assert not pump.board.owner
-    few, many = (outcome.out.count("Sample") for outcome in (brief, everything))
-    assert 2 <= few <= 6 < many
-    assert "IDLE" in brief.out
-    assert "0 damaged" in brief.err
-
-
-def test_monitor_decodes_both_sides_of_a_bus(cli: Cli) -> None:
-    with on_bench("can virtual") as found:
-        channel = found.rig.backend.channel  # type: ignore[union-attr]
-
-        ending = threading.Event()
-
-        def host() -> None:
-            while not ending.is_set():
-                with open_backend(found.rig, PatientClock()) as backend:
-                    drive(backend, 1.0, 30)
-
-        thread = threading.Thread(target=host)
-        thread.start()
-        try:
-            outcome = cli(
-                "monitor", "bench-can", "--all", "--duration", "4.0",
-                "--set", "backend.interface=virtual", "--set", f"backend.channel={channel}",
-            )  # fmt: skip
-        finally:
-            ending.set()
-            thread.join(10.0)
-    for word in (
-        "Sample",
-        "Drive",
-        "Hello",
-        "Identity",
-        "ParameterValue",
-        "PERIOD_US = 1000",
-        "RUN",
-        "ttl_ms 20",
-    ):
-        assert word in outcome.out
-
-
-def test_monitor_of_a_rig_without_a_wire_says_what_it_can_watch(cli: Cli) -> None:
-    outcome = cli("monitor", "bench-1khz")
-    assert outcome.code == 2
-    assert "no wire to listen to" in only_line(outcome)

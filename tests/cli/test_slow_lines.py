@@ -16,7 +16,6 @@ from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Health
 from tests.backends.line import line
 from tests.cli.test_wire_errors import device, only_line, path_of, start
-from tests.firmware.core_library import compiler
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,10 +25,7 @@ if TYPE_CHECKING:
 
     Cli = Callable[..., Outcome]
 
-
-@pytest.fixture(scope="module", autouse=True)
-def needs_compiler() -> None:
-    compiler()
+pytestmark = pytest.mark.usefixtures("needs_compiler")
 
 
 @pytest.mark.parametrize("each_way_ms", [5, 8, 16, 30, 60, 150])
