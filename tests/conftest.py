@@ -10,6 +10,7 @@ import pytest
 
 from tests.firmware.core_library import compiler
 from tests.installed import Finished, environment, install
+from tests.live.processes import own_folder
 from tests.sampling import MARKER, chosen
 from tools import screenshot
 
@@ -76,6 +77,13 @@ def untraced() -> Iterator[None]:
 def needs_compiler() -> None:
     """Skip where there is no C compiler; fail where nothing may be missing."""
     compiler()
+
+
+@pytest.fixture
+def own_run_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Keep the sockets of a test's runs where no other run's are."""
+    with own_folder(monkeypatch) as folder:
+        yield folder
 
 
 @pytest.fixture(scope="session")

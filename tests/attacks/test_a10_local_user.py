@@ -25,13 +25,14 @@ from dcmp_hil.platform import other_users
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.viewer import answers
-from tests.live.processes import BOUND, own_folder, started, until, until_running
+from tests.live.processes import BOUND, started, until, until_running
 from tests.panel.test_browser import free_port
 from tests.telemetry.runs import VIEW, blocks, read_back, values
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("own_run_folder")
 
 _OTHER_USER_ID = 65_534
 _FORGED = "FORGED: the arm is at 0 V, safe to touch"
@@ -64,12 +65,6 @@ with socket.socket(socket.AF_UNIX) as knocking:
     except OSError as error:
         print(type(error).__name__)
 """
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    with own_folder(monkeypatch):
-        yield
 
 
 def _as_another_user(code: str, *arguments: str) -> subprocess.Popen[str]:

@@ -10,26 +10,18 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, places
 from dcmp_hil.live.stopping import End
-from tests.live.processes import BOUND, control_of, own_folder, started, until, until_running
+from tests.live.processes import BOUND, control_of, started, until, until_running
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+pytestmark = pytest.mark.usefixtures("own_run_folder")
 
 
 _RUN = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0", "--json", "figures.json")
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    with own_folder(monkeypatch):
-        yield
 
 
 def _gone(pid: int) -> bool:
