@@ -1,11 +1,10 @@
-"""Telemetry in a process of its own: what comes back, and what its death, or ours, costs."""
+"""Telemetry in a process of its own: what comes back, and what its death costs."""
 
 from __future__ import annotations
 
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import time
 from contextlib import suppress
@@ -16,120 +15,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil import ConfigError, load_rig, run
+from dcmp_hil import ConfigError, run
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import apart as module
 from dcmp_hil.telemetry.apart import Apart
-from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.values import UNKNOWN_TRUTH, Event, EventKind, Reference
-from tests.helpers import bench, cycle
-from tests.telemetry.runs import VIEW, values
+from dcmp_hil.values import Event, EventKind
+from tests.helpers import bench
+from tests.telemetry.sinks import Notes, Refuses, Sleeps, Strikes, T, fill, noted, strike_all
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.recorder import Sink
 
-_T = 1e-3  # s
-_BOUND = 60.0  # s: generous, these machines are shared
-_HELD = Reference(0.0, 0.0, 0.0)
-
-
-class Notes:
-    """A sink that writes what it sees into a file, from any process."""
-
-    def __init__(self, file: Path, warnings: tuple[str, ...] = ()) -> None:
-        self._file = file
-        self.warnings = list(warnings)
-        self._write(f"pid {os.getpid()}")
-
-    def block(self, block: Block) -> None:
-        """Note how many rows there are."""
-        self._write(f"rows {len(block)}")
-
-    def event(self, event: Event) -> None:
-        """Note its text."""
-        self._write(f"event {event.text}")
-
-    def close(self) -> None:
-        """Note that too."""
-        self._write("closed")
-
-    def _write(self, line: str) -> None:
-        with self._file.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
-
-
-class Refuses(Notes):
-    """A sink that cannot be made."""
-
-    def __init__(self, error: Exception) -> None:
-        raise error
-
-
-class Sleeps(Notes):
-    """A sink that takes its time to be made."""
-
-    def __init__(self, seconds: float) -> None:
-        time.sleep(seconds)
-
-
-class Strikes:
-    """A sink in this process that does something at its first block after `at`, once."""
-
-    def __init__(self, at: float, act: Callable[[], None]) -> None:
-        self._at, self._act = at, act
-        self.struck = False
-
-    def block(self, block: Block) -> None:
-        """Strike."""
-        if not self.struck and block["t"][-1] >= self._at:
-            self.struck = True
-            self._act()
-
-    def event(self, event: Event) -> None:
-        """Ignore it."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
-def children() -> list[int]:
-    """Return the processes that this one started and that are there."""
-    return [
-        int(word) for file in Path("/proc/self/task").glob("*/children") for word in file.read_text().split()
-    ]
-
-
-def strike_all(number: signal.Signals) -> None:
-    """Send a signal to every process that this one started."""
-    for pid in children():
-        os.kill(pid, number)
-
-
-def noted(file: Path, what: str) -> list[str]:
-    """Return the lines of that kind, without the kind."""
-    lines = file.read_text(encoding="utf-8").splitlines()
-    return [line.removeprefix(what).strip() for line in lines if line.startswith(what)]
-
-
-@pytest.fixture(autouse=True)
-def _no_process_stays() -> Iterator[None]:
-    before = set(children()), set(Path("/dev/shm").iterdir())  # noqa: S108 - to see that nothing is left there
-    yield
-    assert set(children()) <= before[0]
-    assert set(Path("/dev/shm").iterdir()) <= before[1]  # noqa: S108
-
-
-def fill(apart: Apart, periods: int, first: int = 0) -> None:
-    """Write periods as the loop does."""
-    for k in range(first, first + periods):
-        apart.ring.push(cycle(k * _T), UNKNOWN_TRUTH, _HELD)
-
-
-# ---------------------------------------------------------------- what comes back
+pytestmark = pytest.mark.usefixtures("nothing_left")
 
 
 def test_a_run_gives_the_same_figures_and_columns_from_there() -> None:
@@ -209,7 +110,7 @@ def test_a_run_ends_with_all_its_figures_when_the_process_does_not(number: signa
     result = session.result()
     assert strike.struck
     assert result.summary.periods == len(result.columns["time_s"]) == 1500
-    assert result.columns["time_s"] == pytest.approx(_T * np.arange(1500))
+    assert result.columns["time_s"] == pytest.approx(T * np.arange(1500))
     assert result.dropped == 0
     assert result.events[-1].level == "WARN"
     assert [event.text for event in result.events].count("amplifier at 0 V") == 1
@@ -221,7 +122,7 @@ def test_a_run_ends_with_all_its_figures_when_the_process_does_not(number: signa
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: signal.Signals) -> None:
-    apart = Apart(Statistics(_T), keep=True)
+    apart = Apart(Statistics(T), keep=True)
     apart.open()
     fill(apart, 100)
     assert apart.pid is not None
@@ -236,7 +137,7 @@ def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: s
 def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_CAPACITY", 256)
     told: list[str] = []
-    apart = Apart(Statistics(_T), keep=True, warn=told.append)
+    apart = Apart(Statistics(T), keep=True, warn=told.append)
     apart.open()
     assert apart.pid is not None
     os.kill(apart.pid, signal.SIGSTOP)
@@ -244,20 +145,20 @@ def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.
     apart.close()
     t = apart.figures.columns()["time_s"]
     assert apart.dropped == 1000 - len(t)
-    assert t == pytest.approx(_T * np.arange(1000 - len(t), 1000))
+    assert t == pytest.approx(T * np.arange(1000 - len(t), 1000))
     assert len(t) <= 256
     assert f"{apart.dropped} periods are in no figure" in told[0]
 
 
 def test_events_never_block_and_come_back_although_they_are_not_read() -> None:
-    apart = Apart(Statistics(_T), keep=True)
+    apart = Apart(Statistics(T), keep=True)
     apart.open()
     assert apart.pid is not None
     os.kill(apart.pid, signal.SIGSTOP)
     longest = 0.0
     for k in range(3000):  # more than a socket holds
         began = time.monotonic()
-        apart.event(Event(k * _T, "INFO", EventKind.OTHER, f"event {k} " + "x" * 200))
+        apart.event(Event(k * T, "INFO", EventKind.OTHER, f"event {k} " + "x" * 200))
         longest = max(longest, time.monotonic() - began)
     apart.close()
     assert longest < 1.0
@@ -310,7 +211,7 @@ def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.Mon
     monkeypatch.setattr(module, "_START_TIMEOUT_S", 1e6)
     monkeypatch.setattr(module, "_SLOW_START_S", 0.3)
     told: list[str] = []
-    apart = Apart(Statistics(_T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append)
+    apart = Apart(Statistics(T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append)
     apart.open(lambda: bool(told))
     assert apart.pid is None
     apart.close()
@@ -319,7 +220,7 @@ def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.Mon
 
 def test_a_process_that_works_at_its_figures_is_waited_for() -> None:
     told: list[str] = []
-    apart = Apart(Statistics(_T), keep=True, sinks=[pickle.dumps(partial(Busy))], warn=told.append)
+    apart = Apart(Statistics(T), keep=True, sinks=[pickle.dumps(partial(Busy))], warn=told.append)
     apart.open()
     fill(apart, 100)
     pid = apart.pid
@@ -336,62 +237,3 @@ def test_a_python_that_is_not_there_is_told_of_and_the_run_goes_on(monkeypatch: 
     result = run(bench(), duration=0.2)
     assert result.summary.periods == 200
     assert "could not be started" in result.troubles[0]
-
-
-# ---------------------------------------------------------------- when we fail
-
-_RUNS_ON = """
-import sys
-from contextlib import suppress
-from functools import partial
-from pathlib import Path
-from dcmp_hil import load_rig, run
-from dcmp_hil.telemetry.rerun.sink import RerunSink
-from dcmp_hil.telemetry.rerun.rig_view import view_of
-from tests.telemetry.test_apart import Notes
-rig = load_rig("bench-1khz")
-folder = Path(sys.argv[1])
-dashboard = partial(RerunSink, rig=view_of(rig), record=folder / "run.rrd", viewer="none")
-run(rig, duration=0, sinks=[dashboard, partial(Notes, folder / "notes")])
-"""
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
-    tmp_path: Path, number: signal.Signals
-) -> None:
-    notes = tmp_path / "notes"
-    with subprocess.Popen([sys.executable, "-c", _RUNS_ON, str(tmp_path)], stderr=subprocess.PIPE) as process:
-        _wait(lambda: notes.exists() and len(noted(notes, "rows")) >= 5)
-        process.send_signal(number)
-        process.communicate(timeout=_BOUND)  # until every process with its standard error has ended, too
-    pid = int(noted(notes, "pid")[0])
-    _wait(lambda: not Path(f"/proc/{pid}").exists())
-    assert noted(notes, "closed") == [""]
-    periods = sum(map(int, noted(notes, "rows")))
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == periods
-
-
-def _wait(until: Callable[[], bool]) -> None:
-    end = time.monotonic() + _BOUND
-    while not until():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def test_a_full_disk_costs_one_warning(tmp_path: Path) -> None:
-    maker: Callable[[], Sink] = partial(_limited, tmp_path / "run.rrd")
-    result = run(load_rig("bench-1khz"), duration=3.0, sinks=[maker])
-    assert result.summary.periods == 3000
-    assert result.dropped == 0
-    (trouble,) = result.troubles
-    assert "incomplete" in trouble or "taken nothing" in trouble
-
-
-def _limited(file: Path) -> Sink:
-    """Make a recording that may not grow beyond what fits our own files in memory."""
-    import resource
-
-    sink = RerunSink(VIEW, file, "none")
-    resource.setrlimit(resource.RLIMIT_FSIZE, (900_000, resource.RLIM_INFINITY))
-    return sink
