@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
-from dcmp_hil.ipc.run_end import LIVES
+from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.live.crowd import BETWEEN, PATIENCE, Crowd, listen
 from dcmp_hil.live.knobs import knobs
@@ -212,7 +212,8 @@ class Server:
                 break
             await asyncio.sleep(_POLL_PERIOD_S)
         self._over = True
-        ended = {"ended": self._mailbox.last_words or "it died; the device goes to 0 V by itself."}
+        said = self._mailbox.last_words or "it died; the device goes to 0 V by itself."
+        ended = {"ended": said, "at_zero": self._mailbox.end == AT_ZERO}
         for writer in tuple(self._watchers):
             with suppress(OSError):
                 await asyncio.wait_for(_send(writer, ended), 0.2)

@@ -88,7 +88,7 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
         _, err = run.communicate(timeout=BOUND)
         for watcher in watchers:
             watcher.close()
-    assert json.loads(last) == {"ended": "Amplifier at 0 V."}
+    assert json.loads(last) == {"ended": "Amplifier at 0 V.", "at_zero": True}
     assert run.returncode == 0
     assert err == ""
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.live.processes import BOUND, own_folder, started, until, until_running
+from tests.live.processes import BOUND, control_of, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 _RUN = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0")
 _BOARD = ("--set", "backend.kind=sim-board")  # the firmware's own C
 _REPORTS = Path("reports")
+_NOT_KNOWN = "\N{EN DASH}"  # in the place of a number
 
 
 @pytest.fixture(autouse=True)
@@ -123,6 +126,13 @@ def test_page_finds_the_next_run_and_escape_stops_it(tmp_path: Path) -> None:
                 until_running(run)
                 until(lambda: _text(page, "process") == f"process {run.pid}", "the page found the run")
                 until(lambda: _text(page, "phase") == "running", "the page showed the phase")
+                control = control_of(run.pid)
+                os.kill(control, signal.SIGSTOP)
+                until(lambda: _text(page, "phase") == "no answer", "the page said that the run is silent")
+                assert _text(page, "voltage") == _NOT_KNOWN  # and not the voltage of before
+                os.kill(control, signal.SIGCONT)
+                until(lambda: _text(page, "phase") == "running", "the page heard of the run again")
+                until(lambda: _text(page, "voltage") != _NOT_KNOWN, "the voltage came back")
                 page.find_element("tag name", "body").send_keys("\ue00c")  # Escape
                 run.communicate(timeout=BOUND)
                 assert run.returncode == 0

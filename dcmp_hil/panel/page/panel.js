@@ -301,8 +301,9 @@ function take(now) {
     drawNumbers();
     drawTrace();
   }
-  if (now.connection === "ended") {
-    by("voltage").textContent = now.ended?.includes("Amplifier at 0 V.") ? "0.00" : "–";
+  if (now.connection !== "live") {  // what was true before is not shown as what is
+    for (const one of ["position", "velocity", "error", "voltage"]) by(one).textContent = "–";
+    if (now.at_zero) by("voltage").textContent = "0.00";
     by("meter").style.width = "0";
   }
   drawState();
