@@ -23,7 +23,8 @@ import pytest
 from dcmp_hil.live import places
 from dcmp_hil.recording.reader import read_run
 from tests.live.processes import BOUND, control_of, started, until, until_running
-from tools.stop_bars import HOSTILE, KINDS, WAYS, Bar, attack, table
+from tools.stop_bars.attack import attack
+from tools.stop_bars.bars import HOSTILE, KINDS, WAYS, Bar, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
