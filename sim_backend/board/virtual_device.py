@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import select
 import socket
 import subprocess
@@ -11,11 +10,12 @@ from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from dcmp_hil.errors import BackendError, ConfigError, LinkError, OpenError
+from dcmp_hil.errors import BackendError, LinkError, OpenError
 from sim_backend.board import build
 from sim_backend.board.config import NATIVE, board_config
 from sim_backend.board.plant_io import PlantIO
 from sim_backend.board.plant_port import OUTPUT, PLANT_TIME, TICK, Output
+from sim_backend.board.symlink import Symlink
 from sim_backend.pacer import Pacer
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ class VirtualDevice:
         program: Sequence[str] = (),
     ) -> None:
         self._config = board_config(rig, NATIVE)
-        self._link, self._symlink, self._patience_ms = link, symlink, patience_ms
+        self._link, self._patience_ms = link, patience_ms
+        self._symlink = None if symlink is None else Symlink(symlink)
         self._clock = clock
         self._program = program
         self._pace = None if clock is None else Pacer(clock, rig.period)
@@ -128,7 +129,8 @@ class VirtualDevice:
         self._socket = ours
         try:
             self._learn_port(self._process)
-            self._make_symlink()
+            if self._symlink:
+                self._symlink.make(self.port)
         except BaseException:
             self._end()
             raise
@@ -143,7 +145,8 @@ class VirtualDevice:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(2.0 * _ANSWER_S)
-        self._remove_symlink()
+        if self._symlink:
+            self._symlink.remove()
         self._end()
 
     def start(self) -> None:
@@ -260,27 +263,6 @@ class VirtualDevice:
         if not self.port:
             said = process.communicate(timeout=_END_S)[1].decode().strip()
             raise OpenError(f"The firmware's process did not start: {said}. Look at /dev/pts and /dev/ptmx.")
-
-    def _make_symlink(self) -> None:
-        link = self._symlink
-        if link is None:
-            return
-        try:
-            if link.is_symlink():
-                link.unlink()
-            link.symlink_to(self.port)
-        except OSError as error:
-            self._symlink = None  # not ours to take away
-            raise ConfigError(
-                f"--symlink {link}: {error.strerror or error}. Choose a path that is free, or a symlink, "
-                "in a folder you may write in."
-            ) from None
-
-    def _remove_symlink(self) -> None:
-        link = self._symlink
-        with contextlib.suppress(OSError):
-            if link is not None and str(link.readlink()) == self.port:
-                link.unlink()
 
     def _end(self) -> None:
         """Hang up, which ends the process; help it if it does not."""

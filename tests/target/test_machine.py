@@ -25,14 +25,14 @@ class Bare:
         self.system = System(f405 / "bench_f405_dac.elf")
 
     def write(self, address: int, value: int, size: int = 4) -> None:
-        self.system.store(self.system.uc, address - 0x4000_0000, size, value, None)
+        self.system.bus.store(self.system.uc, address - 0x4000_0000, size, value, None)
 
     def do(self, *writes: tuple[int, int]) -> None:
         for address, value in writes:
             self.write(address, value)
 
     def read(self, address: int) -> int:
-        return self.system.load(self.system.uc, address - 0x4000_0000, 4, None)
+        return self.system.bus.load(self.system.uc, address - 0x4000_0000, 4, None)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from unicorn import (
 from unicorn import arm_const as arm
 
 from tests.target.machine.agenda import Agenda
+from tests.target.machine.bus import Bus
 from tests.target.machine.clocks import Flash, Gpio, Iwdg, Pwr, Rcc
 from tests.target.machine.cpu import HARD_FAULT, RETURN, Cpu
 from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 _EMULATOR: Any = unicorn  # its functions have no types
 STACK_TOP_OF_BOARD = 0x2000_1000
-_PERIPHERALS, _PRIVATE = 0x4000_0000, 0xE000_0000
 _WFI = b"\x30\xbf"
 _RETURNS = 8  # unicorn's number for the end of an exception
 _SLICE = 2000  # instructions at most between two checks of the time
@@ -82,6 +82,7 @@ class System:
         self._asleep, self._reset_for = False, ""
         self.uc: Any = _EMULATOR.Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self.uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
+        self.bus = Bus(self)
         self._map(elf, record)
         self.cpu = Cpu(self.uc, self)
         self.rcc = Rcc(self, crystal=crystal)
@@ -103,35 +104,14 @@ class System:
     def _map(self, elf: Path, record: bytes) -> None:
         uc = self.uc
         lay_out(uc, elf, record)
-        uc.mmio_map(_PERIPHERALS, 0x8_0000, self.load, None, self.store, None)
-        uc.mmio_map(_PRIVATE, 0x10_0000, self._load_private, None, self._store_private, None)
+        self.bus.map(uc)
         uc.hook_add(UC_HOOK_BLOCK, self._block)
         if self.exact:
             uc.hook_add(UC_HOOK_CODE, self._instruction)
         uc.hook_add(UC_HOOK_INTR, self._trap)
         uc.hook_add(UC_HOOK_MEM_WRITE, self._program, begin=FLASH, end=FLASH + FLASH_BYTES - 1)
 
-    # ---------------------------------------------------------------------------------- registers
-
-    def load(self, _: Any, offset: int, size: int, __: object) -> int:
-        block = self.blocks.get((_PERIPHERALS + offset) >> 10)
-        if block is None:
-            self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
-            return 0
-        return block.load(_PERIPHERALS + offset - block.base, size) & 0xFFFF_FFFF
-
-    def store(self, _: Any, offset: int, size: int, value: int, __: object) -> None:
-        block = self.blocks.get((_PERIPHERALS + offset) >> 10)
-        if block is None:
-            self.misuse.append(f"nothing is at {_PERIPHERALS + offset:#x}")
-            return
-        block.store(_PERIPHERALS + offset - block.base, size, value)
-
-    def _load_private(self, _: Any, offset: int, __: int, ___: object) -> int:
-        return self.cpu.load(offset)
-
-    def _store_private(self, _: Any, offset: int, size: int, value: int, __: object) -> None:
-        self.cpu.store(offset, size, value)
+    # ------------------------------------------------------------------------------- flash memory
 
     def _program(self, uc: Any, _: int, address: int, size: int, value: int, __: object) -> None:
         before = int.from_bytes(uc.mem_read(address, 4), "little")
