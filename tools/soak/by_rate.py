@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.makers import SinkMaker
 
-_PORT = 30_000
-_FAR = 8_000  # rows: a quarter of the ring
-_BATCH_S = 0.1  # s of data that are written at once
+_FIRST_PORT = 30_000
+_WAITING_ROWS_MAX = 8_000  # a quarter of the ring
+_BATCH_S = 0.1  # of data that is written at once
 _BATCHES_A_MINUTE = round(60.0 / _BATCH_S)
-_TOTAL_EVERY = 50  # batches: 5 s of data between two looks at what all take
-_QUIET = 0.25  # s without a byte more in the files: free memory is given back five times meanwhile
-_QUIET_PATIENCE = 30.0  # s
-_LOOK = 0.05  # s
+_TOTAL_EVERY_BATCHES = 200  # 20 s of data between two looks at what all processes take
+_QUIET_S = 0.25  # during which no file grows: free memory is given back five times meanwhile
+_QUIET_TIMEOUT_S = 30.0
+_POLL_S = 0.05
 
 
 def soak(minutes: float, speed: float, folder: Path, history: str, leak: float = 0.0) -> Soaked:
@@ -85,7 +85,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
             late = began + batch * _BATCH_S / speed - time.monotonic()
             if late > 0:
                 time.sleep(late)
-            while apart.behind > _FAR:
+            while apart.behind > _WAITING_ROWS_MAX:
                 time.sleep(0.005)
             t = source.write(round(_BATCH_S / rig.period))
             for event in events(batch, t):
@@ -93,7 +93,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
             if batch % _BATCHES_A_MINUTE == _BATCHES_A_MINUTE - 1:
                 _wait_until_quiet(apart, folder)
                 memory.look((batch + 1) / _BATCHES_A_MINUTE, pids, os.getpid())
-            elif batch % _TOTAL_EVERY == 0:
+            elif batch % _TOTAL_EVERY_BATCHES == 0:
                 memory.look_at_total(pids)
         wall = time.monotonic() - began
         cpu = {name: cpu_s(pid) for name, pid in pids.items()}
@@ -108,9 +108,9 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
 
 
 def _makers(rig: Rig, folder: Path, history: str, leak: float) -> list[SinkMaker]:
-    port = free_port(_PORT)
+    port = free_port(_FIRST_PORT)
     if port is None:
-        raise OSError(f"no free port from {_PORT} on")
+        raise OSError(f"no free port from {_FIRST_PORT} on")
     makers: list[SinkMaker] = [
         partial(recording, folder / "run.mcap", rig.period, about(rig), rig_json(rig)),
         partial(
@@ -129,9 +129,9 @@ def _makers(rig: Rig, folder: Path, history: str, leak: float) -> list[SinkMaker
 def _wait_until_quiet(apart: Apart, folder: Path) -> None:
     """Wait until the sinks have taken all there is and the files do not grow any more."""
     now = time.monotonic()
-    quiet_from, end, sizes = now, now + _QUIET_PATIENCE, [0]
-    while now - quiet_from < _QUIET and now < end:
-        time.sleep(_LOOK)
+    quiet_from, end, sizes = now, now + _QUIET_TIMEOUT_S, [0]
+    while now - quiet_from < _QUIET_S and now < end:
+        time.sleep(_POLL_S)
         now, before = time.monotonic(), sizes
         sizes = [file.stat().st_size for file in sorted(folder.iterdir())]
         if apart.behind or sizes != before:

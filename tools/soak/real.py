@@ -12,7 +12,7 @@ from pathlib import Path
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 
-_LOOK = 5.0  # s
+_POLL_S = 5.0
 
 
 def real(minutes: float, folder: Path) -> Soaked:
@@ -22,7 +22,7 @@ def real(minutes: float, folder: Path) -> Soaked:
     memory, cpu, began = Memory(), dict[str, float](), time.monotonic()
     with subprocess.Popen(command, cwd=folder) as process:  # noqa: S603 - our own
         while process.poll() is None:
-            time.sleep(_LOOK)
+            time.sleep(_POLL_S)
             processes = _processes(process.pid)
             memory.look((time.monotonic() - began) / 60.0, processes, process.pid)
             for name, pid in processes.items():
