@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 
 Frames = list[tuple[int, bytes]]
 
 
-class Seed(Stranger):
+class Seed(ReferenceDevice):
     """A device that is built like the healthy one, and changed by `sow`."""
 
     def __post_init__(self) -> None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from tests.conformance.seed import Seed
 from tests.conformance.seeds_drives import drive_seed
-from tests.contract import stranger_wire as wire
-from tests.contract.stranger_motion import Motion
-from tests.contract.stranger_wire import RUN
+from tests.contract import reference_wire as wire
+from tests.contract.reference_motion import Motion
+from tests.contract.reference_wire import RUN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -7,9 +7,9 @@ import struct
 from typing import TYPE_CHECKING, Any
 
 from tests.conformance.seed import Seed
-from tests.contract import stranger_wire as wire
-from tests.contract.stranger import HASH, VERSION
-from tests.contract.stranger_wire import ARMING, RUN
+from tests.contract import reference_wire as wire
+from tests.contract.reference_device import HASH, VERSION
+from tests.contract.reference_wire import ARMING, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,7 +7,7 @@ import struct
 from typing import TYPE_CHECKING, Any
 
 from tests.conformance.seed import Seed
-from tests.contract import stranger_wire as wire
+from tests.contract import reference_wire as wire
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -22,7 +22,7 @@ from dcmp_hil.platform.clock import MonotonicClock
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.conformance.seeded import SEEDS
 from tests.contract.pump import PtyPort, Pump, VirtualBus
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 from tests.firmware.core_library import compiler
 from tests.helpers import bench
 from tests.installed import environment
@@ -204,7 +204,7 @@ def test_the_checks_are_listed(script: Script) -> None:
     assert [line.split()[0] for line in done.out.splitlines()] == [check.name for check in CHECKS]
 
 
-class Patient(Stranger):
+class Patient(ReferenceDevice):
     """A device whose encoder stands still: what a pump ticks."""
 
     def tick(self) -> None:  # type: ignore[override]

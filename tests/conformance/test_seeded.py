@@ -22,7 +22,7 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tests.conformance.seeded import SEEDS
 from tests.conformance.virtual import on
 from tests.contract.firmware_device import Firmware
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 from tools.protocol import PAGE
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ BY_NAME = {check.name: check for check in CHECKS}
 
 
 @pytest.mark.parametrize("carrier", ["cobs", "slcan", "can"])
-@pytest.mark.parametrize("make", [Stranger, Firmware])
+@pytest.mark.parametrize("make", [ReferenceDevice, Firmware])
 def test_a_device_as_the_page_says_passes(make: Callable[..., Any], carrier: str) -> None:
     client, arm = on(make(carrier=carrier), carrier)
     outcomes = list(run_checks(client, CHECKS, armed=True, clear=False))
@@ -48,7 +48,7 @@ def test_a_device_as_the_page_says_passes(make: Callable[..., Any], carrier: str
 
 @pytest.mark.parametrize("period_us", [250, 500, 2000])
 def test_other_periods_pass_too(period_us: int) -> None:
-    client, _ = on(Stranger(carrier="can", period_us=period_us, watchdog_ms=20), "can")
+    client, _ = on(ReferenceDevice(carrier="can", period_us=period_us, watchdog_ms=20), "can")
     outcomes = list(run_checks(client, CHECKS, armed=True, clear=False))
     assert {one.check.name: one.findings for one in outcomes if one.findings} == {}
 
@@ -84,14 +84,14 @@ def test_every_check_has_an_error_that_it_finds() -> None:
 @pytest.mark.parametrize("carrier", ["cobs", "slcan", "can"])
 def test_without_arm_no_drive_arms(carrier: str, monkeypatch: pytest.MonkeyPatch) -> None:
     words: list[tuple[int, ...]] = []
-    device = Stranger(carrier=carrier)
-    usual = Stranger._on_drive  # noqa: SLF001 - what the device heard
+    device = ReferenceDevice(carrier=carrier)
+    usual = ReferenceDevice._on_drive  # noqa: SLF001 - what the device heard
 
-    def hear(self: Stranger, content: bytes) -> None:
+    def hear(self: ReferenceDevice, content: bytes) -> None:
         words.append(struct.unpack("<hHHB", content))
         usual(self, content)
 
-    monkeypatch.setattr(Stranger, "_on_drive", hear)
+    monkeypatch.setattr(ReferenceDevice, "_on_drive", hear)
     client, arm = on(device, carrier)
     verdicts = Counter(one.verdict for one in run_checks(client, CHECKS, armed=False, clear=False))
     assert verdicts[Verdict.NEEDS_ARM] == sum(check.needs_arm for check in CHECKS)
@@ -103,7 +103,7 @@ def test_without_arm_no_drive_arms(carrier: str, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize(("owner", "state"), [(0x4321, 1), (0, 4)])
 def test_a_device_that_is_owned_or_in_fault_is_left_alone(owner: int, state: int) -> None:
-    device = Stranger(carrier="can")
+    device = ReferenceDevice(carrier="can")
     client, arm = on(device, "can")
     client.listen(2)
     client.send(Hello(owner, PROTOCOL_HASH) if owner else Stop(3))
@@ -121,7 +121,7 @@ def test_a_device_that_is_owned_or_in_fault_is_left_alone(owner: int, state: int
 
 @pytest.mark.parametrize("apart", [1, 77, 200])
 def test_two_devices_with_one_node_are_no_findings(apart: int) -> None:
-    class Two(Stranger):
+    class Two(ReferenceDevice):
         """A device, and another one on the same bus that says what it says some ticks before."""
 
         def transmit_frames(self) -> list[tuple[int, bytes]]:
@@ -141,7 +141,7 @@ def _earlier(message: Any, ticks: int) -> Any:
 
 
 def test_an_end_that_is_asked_for_leaves_the_device_off() -> None:
-    device = Stranger(carrier="can")
+    device = ReferenceDevice(carrier="can")
     client, arm = on(device, "can", lambda: bool(arm.log) and arm.log[-1][0] != 0)
     with pytest.raises(StoppedError):
         list(run_checks(client, CHECKS, armed=True, clear=False))
@@ -151,7 +151,7 @@ def test_an_end_that_is_asked_for_leaves_the_device_off() -> None:
 
 
 def test_a_device_that_falls_silent_is_a_finding_and_the_end() -> None:
-    class Silent(Stranger):
+    class Silent(ReferenceDevice):
         def transmit_frames(self) -> list[tuple[int, bytes]]:
             return super().transmit_frames() if self.tick_count < 2000 else []
 
@@ -166,7 +166,7 @@ def test_a_device_that_falls_silent_is_a_finding_and_the_end() -> None:
 
 
 def test_a_silent_port_is_no_device() -> None:
-    class Silent(Stranger):
+    class Silent(ReferenceDevice):
         def transmit_frames(self) -> list[tuple[int, bytes]]:
             return []
 

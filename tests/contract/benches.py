@@ -13,7 +13,7 @@ from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board
 from tests.contract.pump import PtyPort, Pump, VirtualBus
-from tests.contract.stranger_board import StrangerBoard
+from tests.contract.reference_board import ReferenceBoard
 from tests.helpers import bench
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 IN_PROCESS = (
     *("sim-board cobs", "sim-board slcan", "sim-board can"),
-    *("stranger cobs", "stranger slcan", "stranger can"),
+    *("reference cobs", "reference slcan", "reference can"),
 )
 PUMPED = ("can virtual", "slcan pty", "cobs pty")
 WIRED = (*IN_PROCESS, *PUMPED)
@@ -97,7 +97,7 @@ def on_bench(kind: str, *overrides: str, **of_board: int) -> Iterator[Bench]:
     elif kind in IN_PROCESS:
         make, carrier = kind.split()
         rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *overrides)
-        board = (Board if make == "sim-board" else StrangerBoard)(rig, carrier=carrier, **of_board)
+        board = (Board if make == "sim-board" else ReferenceBoard)(rig, carrier=carrier, **of_board)
         first = SimBoardBackend(rig, SimulatedClock(), board)  # type: ignore[arg-type]
         yield Bench(rig, lambda: first, first.board, carrier=carrier)
     else:

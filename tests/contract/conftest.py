@@ -8,13 +8,13 @@ import pytest
 
 from tests.contract.firmware_device import Firmware
 from tests.contract.protocol_host import Device, Host
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-@pytest.fixture(params=[Stranger, Firmware])
+@pytest.fixture(params=[ReferenceDevice, Firmware])
 def device(request: pytest.FixtureRequest) -> Callable[..., Device]:
     make: Callable[..., Device] = request.param
     return make

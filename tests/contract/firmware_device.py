@@ -1,4 +1,4 @@
-"""The firmware's C behind the stranger's interface, so that both answer the same questions."""
+"""The firmware's C behind the interface of the reference device, so that both answer the same questions."""
 
 from __future__ import annotations
 

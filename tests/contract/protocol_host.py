@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple, Protocol
 
-from tests.contract import stranger_wire as wire
-from tests.contract.stranger_wire import RUN
+from tests.contract import reference_wire as wire
+from tests.contract.reference_wire import RUN
 
 OURS, THEIRS = 0x1234, 0x4321
 HASH = wire.protocol_hash()

@@ -106,7 +106,7 @@ def test_host_that_slept_does_not_take_another_hosts_run_for_its_own(slept: int)
         assert bench.board.applied_mV == 2000
 
 
-@pytest.mark.parametrize("kind", ["sim-board can", "stranger can"])
+@pytest.mark.parametrize("kind", ["sim-board can", "reference can"])
 def test_an_identity_that_answers_another_host_is_not_believed(kind: str) -> None:
     """Another host's HELLO comes just before ours: its IDENTITY says owned, and means the other one."""
     with on_bench(kind) as bench:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.contract import stranger_wire as wire
+from tests.contract import reference_wire as wire
 from tests.contract.protocol_host import THEIRS, Device, Host
-from tests.contract.stranger_wire import ARMING, FAULTED, IDLE, RUN
+from tests.contract.reference_wire import ARMING, FAULTED, IDLE, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Callable

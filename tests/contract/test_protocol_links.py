@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.contract import stranger_wire as wire
+from tests.contract import reference_wire as wire
 from tests.contract.firmware_device import Firmware
-from tests.contract.stranger_wire import FAULTED, IDLE, RUN
+from tests.contract.reference_wire import FAULTED, IDLE, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.contract.firmware_device import Firmware
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 from tests.contract.traces import TRACES
 from tools.traces import __main__ as tool
 from tools.traces.scenarios import SCENARIOS
@@ -31,7 +31,7 @@ def test_the_files_and_the_page_are_what_the_core_does() -> None:
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_both_devices_follow_every_trace(name: str) -> None:
     trace = TRACES[name]
-    for make in (Firmware, Stranger):
+    for make in (Firmware, ReferenceDevice):
         assert differences(make(carrier="can", **trace["built"]), trace["steps"]) == []
 
 

@@ -10,8 +10,8 @@ import pytest
 from sim_backend.board import build, hostlib
 from tests.conformance.seeded import SEEDS
 from tests.contract.firmware_device import Firmware
-from tests.contract.stranger import Stranger
-from tests.contract.stranger_motion import Motion
+from tests.contract.reference_device import ReferenceDevice
+from tests.contract.reference_motion import Motion
 from tests.contract.traces import found_by
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ MOTIONS = (
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.__name__)
 def test_the_traces_find_an_error_in_the_limits(motion: type[Motion]) -> None:
-    class Device(Stranger):
+    class Device(ReferenceDevice):
         def __post_init__(self) -> None:
             super().__post_init__()
             self._motion = motion(self.period_us)

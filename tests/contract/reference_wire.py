@@ -1,4 +1,4 @@
-"""Checksums, frames, carriers and the encoder as a stranger reads them in docs/protocol.md."""
+"""Checksums, frames, carriers and the encoder as docs/protocol.md alone describes them."""
 
 from __future__ import annotations
 
@@ -246,3 +246,8 @@ class Parameters:
         if result == OK:
             self.now[id_] = value
         return result
+
+
+LEASE_US = 500_000
+ARMING_DRIVES = 10
+LINES = {"cobs": Cobs, "slcan": Slcan, "can": Line}

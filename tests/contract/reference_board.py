@@ -1,4 +1,4 @@
-"""The stranger's device with the plant on its pins: a judge of the host that knows only the page."""
+"""The reference device with the plant on its pins: a judge of the host that knows only the page."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sim_backend.board.config import SIMULATED, board_config
 from sim_backend.board.plant_io import PlantIO
-from tests.contract.stranger import Stranger
+from tests.contract.reference_device import ReferenceDevice
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -18,7 +18,7 @@ _BUILT = (
 )
 
 
-class StrangerBoard(Stranger):
+class ReferenceBoard(ReferenceDevice):
     """What sim_backend.board.board.Board is to the firmware."""
 
     def __init__(

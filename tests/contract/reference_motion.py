@@ -1,4 +1,4 @@
-"""The encoder and its limits as a stranger reads them in docs/protocol.md."""
+"""The encoder and its limits as docs/protocol.md alone describes them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import statistics
 from collections import deque
 from typing import TYPE_CHECKING
 
-from tests.contract.stranger_wire import ENCODER_JUMP, OVER_SPEED, OVER_TRAVEL
+from tests.contract.reference_wire import ENCODER_JUMP, OVER_SPEED, OVER_TRAVEL
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

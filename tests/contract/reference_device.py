@@ -7,22 +7,19 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tests.contract import stranger_wire as wire
-from tests.contract.stranger_motion import Motion
-from tests.contract.stranger_wire import ARMING, BOOT, FAULTED, IDLE, RUN
+from tests.contract import reference_wire as wire
+from tests.contract.reference_motion import Motion
+from tests.contract.reference_wire import ARMING, BOOT, FAULTED, IDLE, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 HASH = wire.protocol_hash()
 VERSION = 1 * 256 + 0
-LEASE_US = 500_000
-ARMING_DRIVES = 10
-LINES = {"cobs": wire.Cobs, "slcan": wire.Slcan, "can": wire.Line}
 
 
 @dataclass(kw_only=True, eq=False)
-class Stranger:
+class ReferenceDevice:
     """The device: bytes or frames in and out, `tick` for each period, `advance` for the time between."""
 
     carrier: str = "cobs"
@@ -44,7 +41,7 @@ class Stranger:
         self._reach = -(-3000 // self.period_us)
         self._tenth_s = -(-100_000 // self.period_us)
         self._periods = 0
-        self._line = LINES[self.carrier]()
+        self._line = wire.LINES[self.carrier]()
         self._link_up = True
         self._outbox = wire.Outbox()
         self._recent: deque[bool] = deque(maxlen=100)  # True for a corrupt frame
@@ -234,7 +231,7 @@ class Stranger:
             self._armed += 1
             if not starts or step > self._reach:
                 self.state = IDLE
-            elif self._armed == ARMING_DRIVES:
+            elif self._armed == wire.ARMING_DRIVES:
                 self.state, self._wanted_mV = RUN, 0
                 self._motion.armed()
         elif self.state == RUN:
@@ -257,7 +254,7 @@ class Stranger:
 
     def _pass(self, us: int) -> None:
         self.now_us += us
-        if self.state not in {ARMING, RUN} and self.now_us - self._heard_us >= LEASE_US:
+        if self.state not in {ARMING, RUN} and self.now_us - self._heard_us >= wire.LEASE_US:
             self._begin_session(0)
 
     def _silent_us(self) -> int:
