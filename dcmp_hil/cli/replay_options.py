@@ -13,7 +13,7 @@ from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.observers.paper import PaperSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ColumnOptions, ReplaySettings
+from dcmp_hil.offline import ColumnOptions, ReplaySettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

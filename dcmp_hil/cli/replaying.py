@@ -11,10 +11,10 @@ from rich.text import Text
 from dcmp_hil.cli import console
 from dcmp_hil.cli.outputs import free_name, json_place, try_places, write_each
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import read_recording, replay, write_csv, write_rrd
+from dcmp_hil.offline import read_recording, replay, write_csv, write_rrd
 
 if TYPE_CHECKING:
-    from dcmp_hil.replay import ColumnOptions, ReplayResult, ReplaySettings
+    from dcmp_hil.offline import ColumnOptions, ReplayResult, ReplaySettings
 
 
 class Outputs(NamedTuple):

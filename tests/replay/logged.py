@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from dcmp_hil.replay import ColumnOptions, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.replay.synthetic import Truth, swing
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.control.model import Model
-from dcmp_hil.replay import Recording
+from dcmp_hil.offline import Recording
 from sim_backend.plant import MoreauPlant
 
 if TYPE_CHECKING:

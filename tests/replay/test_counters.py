@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ColumnOptions, Recording, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, Recording, ReplaySettings, read_recording, replay
 from tests.replay.logged import COUNTS, HEADER, T, columns, figure, motion
 
 if TYPE_CHECKING:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ColumnOptions, ReplaySettings, read_recording, replay
-from dcmp_hil.replay.names import match
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
+from dcmp_hil.offline.names import match
 from tests.replay.logged import COUNTS, DEG, HEADER, TOLERANCE, columns, figure, motion
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.replay.recording import Recording
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.units import Quantity
 
 
 UNITS: dict[Quantity, str] = {"time": "ms", "position": "deg", "voltage": "mV", "torque": "mN m"}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import (
+from dcmp_hil.offline import (
     ReplaySettings,
     columns,
     estimate_counts_per_rev,
@@ -21,14 +21,14 @@ from dcmp_hil.replay import (
     write_rrd,
     zero_phase,
 )
-from dcmp_hil.replay.names import match
-from dcmp_hil.replay.resolution import equivalent_counts_per_rev
+from dcmp_hil.offline.names import match
+from dcmp_hil.offline.resolution import equivalent_counts_per_rev
 from tests.replay.synthetic import swing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.offline.units import Quantity
 
 LSB = 2.0 * math.pi / 2156
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dcmp_hil.replay import Figures, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import Figures, ReplaySettings, read_recording, replay
 
 DATA = Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "dfki_pendulum"
 INERTIA = 0.16  # kg m2

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ColumnOptions, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.replay.synthetic import INERTIA, MODEL, Truth, swing, write
 
 

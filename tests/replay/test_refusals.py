@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ColumnOptions, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 
 if TYPE_CHECKING:
     from pathlib import Path

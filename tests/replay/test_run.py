@@ -8,7 +8,7 @@ import pytest
 from dcmp_hil.control.observers import ObserverContext
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay import ReplayResult, ReplaySettings, replay
+from dcmp_hil.offline import ReplayResult, ReplaySettings, replay
 from dcmp_hil.values import Estimate, Sample
 from tests.replay.synthetic import INERTIA, MODEL, Truth, lose, swing
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.replay import ColumnOptions, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.replay.logged import (
     EPOCH,
     HEADER,

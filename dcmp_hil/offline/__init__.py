@@ -5,14 +5,14 @@ result = replay(recording, ReplaySettings(inertia=0.16))
 result.figures.velocity_error_rms_rad_s
 """
 
-from dcmp_hil.replay.export import columns, write_csv, write_rrd
-from dcmp_hil.replay.figures import Estimates, Figures
-from dcmp_hil.replay.reading import read_recording
-from dcmp_hil.replay.recording import ColumnOptions, Recording
-from dcmp_hil.replay.reference import ZeroPhase, zero_phase
-from dcmp_hil.replay.resolution import estimate_counts_per_rev
-from dcmp_hil.replay.run import ReplayResult, replay
-from dcmp_hil.replay.settings import ReplaySettings
+from dcmp_hil.offline.export import columns, write_csv, write_rrd
+from dcmp_hil.offline.figures import Estimates, Figures
+from dcmp_hil.offline.reading import read_recording
+from dcmp_hil.offline.recording import ColumnOptions, Recording
+from dcmp_hil.offline.reference import ZeroPhase, zero_phase
+from dcmp_hil.offline.resolution import estimate_counts_per_rev
+from dcmp_hil.offline.run import ReplayResult, replay
+from dcmp_hil.offline.settings import ReplaySettings
 
 __all__ = [
     "ColumnOptions",

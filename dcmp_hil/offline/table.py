@@ -7,9 +7,9 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.cells import is_clock, is_value, label_in, number, unit_in
-from dcmp_hil.replay.decoding import read_lines
-from dcmp_hil.replay.layout import (
+from dcmp_hil.offline.cells import is_clock, is_value, label_in, number, unit_in
+from dcmp_hil.offline.decoding import read_lines
+from dcmp_hil.offline.layout import (
     BLANK,
     COMMENT,
     HALF,
@@ -20,15 +20,15 @@ from dcmp_hil.replay.layout import (
     prepared,
     split,
 )
-from dcmp_hil.replay.names import known_in
-from dcmp_hil.replay.units import any_unit
+from dcmp_hil.offline.names import known_in
+from dcmp_hil.offline.units import any_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from dcmp_hil.replay.decoding import Lines
-    from dcmp_hil.replay.layout import Layout
+    from dcmp_hil.offline.decoding import Lines
+    from dcmp_hil.offline.layout import Layout
 
 Line = tuple[int, str]  # its number in the file, from 1, and its text
 

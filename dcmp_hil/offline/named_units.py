@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.units import find_unit
+from dcmp_hil.offline.units import find_unit
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.offline.units import Quantity
 
 _BRACKETED = re.compile(r"[^\[({]*[\w\s.][\[({]\s*([^\[\](){}]*?)\s*[\])}]\s*")
 _SLASHED = re.compile(r"\s*[^\W\d_]\w*\s*/\s*([^\s/]{1,7})\s*")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.units import COUNTS
+from dcmp_hil.offline.units import COUNTS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

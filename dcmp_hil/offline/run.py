@@ -9,19 +9,19 @@ import numpy as np
 
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.offline.figures import Estimates, Figures, judge, sampling
+from dcmp_hil.offline.plausibility import check_assumed, check_estimates, check_motion
+from dcmp_hil.offline.preparation import prepare
+from dcmp_hil.offline.reference import ZeroPhase, zero_phase
+from dcmp_hil.offline.settings import ReplaySettings
 from dcmp_hil.plugins.checked import failure_of
-from dcmp_hil.replay.figures import Estimates, Figures, judge, sampling
-from dcmp_hil.replay.plausibility import check_assumed, check_estimates, check_motion
-from dcmp_hil.replay.preparation import prepare
-from dcmp_hil.replay.reference import ZeroPhase, zero_phase
-from dcmp_hil.replay.settings import ReplaySettings
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.replay.recording import Recording
+    from dcmp_hil.offline.recording import Recording
 
 _LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
 _ROUNDING_S = 1e-6  # s: the row at `start` itself stays out, however the file writes its time

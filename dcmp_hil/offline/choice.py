@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.cells import is_clock, numbers
-from dcmp_hil.replay.layout import HALF
-from dcmp_hil.replay.names import listed, match, sample_number, split_time
+from dcmp_hil.offline.cells import is_clock, numbers
+from dcmp_hil.offline.layout import HALF
+from dcmp_hil.offline.names import listed, match, sample_number, split_time
 
 if TYPE_CHECKING:
-    from dcmp_hil.replay.names import Match
-    from dcmp_hil.replay.recording import ColumnOptions
-    from dcmp_hil.replay.table import Table
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.offline.names import Match
+    from dcmp_hil.offline.recording import ColumnOptions
+    from dcmp_hil.offline.table import Table
+    from dcmp_hil.offline.units import Quantity
 
 NONE = "none"
 

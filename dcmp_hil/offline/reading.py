@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.cells import clock_times, is_clock, numbers
-from dcmp_hil.replay.choice import choose
-from dcmp_hil.replay.inputs import held, undamaged
-from dcmp_hil.replay.recording import ColumnOptions, Recording
-from dcmp_hil.replay.stamps import Stamps, epoch_unit, rising
-from dcmp_hil.replay.table import read_table
-from dcmp_hil.replay.turns import Motion, continuous, moduli
-from dcmp_hil.replay.units import COUNTS, known_unit
+from dcmp_hil.offline.cells import clock_times, is_clock, numbers
+from dcmp_hil.offline.choice import choose
+from dcmp_hil.offline.inputs import held, undamaged
+from dcmp_hil.offline.recording import ColumnOptions, Recording
+from dcmp_hil.offline.stamps import Stamps, epoch_unit, rising
+from dcmp_hil.offline.table import read_table
+from dcmp_hil.offline.turns import Motion, continuous, moduli
+from dcmp_hil.offline.units import COUNTS, known_unit
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.replay.choice import Columns
-    from dcmp_hil.replay.names import Match
-    from dcmp_hil.replay.table import Table
+    from dcmp_hil.offline.choice import Columns
+    from dcmp_hil.offline.names import Match
+    from dcmp_hil.offline.table import Table
 
     Column = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def read_recording(path: Path, options: ColumnOptions | None = None) -> Recordin
     Parameters
     ----------
     path
-        The file; see `dcmp_hil.replay.table.read_table`.
+        The file; see `dcmp_hil.offline.table.read_table`.
     options
         Names, units and what else the file does not tell.
 

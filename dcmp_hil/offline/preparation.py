@@ -12,17 +12,17 @@ from dcmp_hil.control.observers import ObserverContext
 from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.offline.resolution import equivalent_counts_per_rev, estimate_counts_per_rev
+from dcmp_hil.offline.settings import IDEAL, ReplaySettings
 from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked import CheckedObserver
 from dcmp_hil.plugins.roles import OBSERVER
-from dcmp_hil.replay.resolution import equivalent_counts_per_rev, estimate_counts_per_rev
-from dcmp_hil.replay.settings import IDEAL, ReplaySettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.replay.recording import Recording
+    from dcmp_hil.offline.recording import Recording
 
 _PERIOD_MIN_S = 1e-6  # s: a shorter period is a wrong unit
 _USUAL_COUNTS = 4096.0  # where the recording tells nothing

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.replay.run import ReplayResult
+    from dcmp_hil.offline.run import ReplayResult
 
 _INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V", "none": "voltage_V"}
 _APPLICATION_ID = "dcmp-hil replay"

@@ -10,8 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.replay.recording import Recording
-    from dcmp_hil.replay.reference import ZeroPhase
+    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.reference import ZeroPhase
 
 _ROUNDING_RAD_S2 = 1e-12  # rad/s2: what rounding leaves of a constant
 

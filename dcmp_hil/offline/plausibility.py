@@ -11,9 +11,9 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.replay.figures import Estimates
-    from dcmp_hil.replay.recording import Recording
-    from dcmp_hil.replay.reference import ZeroPhase
+    from dcmp_hil.offline.figures import Estimates
+    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.reference import ZeroPhase
 
 _SPEED_MAX_RAD_S = 2000.0  # rad/s, 19,000 rpm
 _ERROR_RATIO_MAX = 3.0  # times the motion itself: no observer that follows it is so far off

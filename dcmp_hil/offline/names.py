@@ -7,13 +7,13 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.named_units import written_unit
-from dcmp_hil.replay.units import SI, bare, find_unit, known_unit
+from dcmp_hil.offline.named_units import written_unit
+from dcmp_hil.offline.units import SI, bare, find_unit, known_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.replay.units import Quantity
+    from dcmp_hil.offline.units import Quantity
 
 # Words that a quantity goes by, the likeliest first; German ones, too, since Excel and LabVIEW write them.
 _NAMES: dict[Quantity, tuple[str, ...]] = {

@@ -8,7 +8,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.replay.cells import is_value
+from dcmp_hil.offline.cells import is_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.replay.units import any_unit
+from dcmp_hil.offline.units import any_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
