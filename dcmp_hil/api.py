@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
-    from dcmp_hil.telemetry.audience import Sink
-    from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.dispatcher import Sink
+    from dcmp_hil.telemetry.sink_factories import SinkMaker
 
 
 def run(

@@ -19,11 +19,11 @@ from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
 from dcmp_hil.platform.realtime import RealTime
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.result import Result
-from dcmp_hil.telemetry.apart import Apart
-from dcmp_hil.telemetry.figures import Figures
-from dcmp_hil.telemetry.keeper import Keeper
-from dcmp_hil.telemetry.makers import Deferred, deferred, sorted_out
+from dcmp_hil.telemetry.memory_sink import Keeper
+from dcmp_hil.telemetry.sink_factories import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
+from dcmp_hil.telemetry.summary_sink import Figures
+from dcmp_hil.telemetry.telemetry_process import Apart
 from dcmp_hil.values import CauseData, Event, EventKind
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live import Control
-    from dcmp_hil.telemetry.audience import Sink
-    from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.dispatcher import Sink
+    from dcmp_hil.telemetry.sink_factories import SinkMaker
     from dcmp_hil.values import EventData, Level
 
 

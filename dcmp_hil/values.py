@@ -121,7 +121,7 @@ class LimitData(NamedTuple):
 class LinkData(NamedTuple):
     """Data of an event of kind LINK."""
 
-    counters: Mapping[str, int]  # by the names of `dcmp_hil.telemetry.link`; without what was not told
+    counters: Mapping[str, int]  # by the names of `dcmp_hil.telemetry.link_events`; without what was not told
 
 
 class ChangeData(NamedTuple):

@@ -18,10 +18,10 @@ from dcmp_hil.device.links.factory import make_link
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named
 from dcmp_hil.telemetry import signals
-from dcmp_hil.telemetry.keeper import Keeper
-from dcmp_hil.telemetry.picture import draw_run
+from dcmp_hil.telemetry.memory_sink import Keeper
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
+from dcmp_hil.telemetry.run_plot import draw_run
 from dcmp_hil.telemetry.signals import SIGNALS, by_plot
 from sim_backend.faults.fault import KINDS as FAULTS
 from sim_backend.plant import make_plant

@@ -23,7 +23,7 @@ from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.sink_factories import SinkMaker
 
 _PORT = 29_000
 _RECORDS, _ROUNDS = 2000, 25

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.values import Event

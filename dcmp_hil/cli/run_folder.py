@@ -115,7 +115,7 @@ class RunFolder:
             return
         picture = self.path / "run.png"
         try:
-            from dcmp_hil.telemetry.picture import draw_run
+            from dcmp_hil.telemetry.run_plot import draw_run
 
             draw_run(result.columns, result.rig.name, picture)
         except BaseException as error:

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.fault_injection import Faults
     from dcmp_hil.live.process import ControlProcess
-    from dcmp_hil.telemetry.makers import SinkMaker
     from dcmp_hil.telemetry.rerun.sink import Viewer
+    from dcmp_hil.telemetry.sink_factories import SinkMaker
 
 INCOMPLETE = "recording_incomplete"
 """How a run ended that went well, and is not wholly in its recording."""

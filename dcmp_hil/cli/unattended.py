@@ -12,7 +12,7 @@ from dcmp_hil.cli.onlookers import use_terminal
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.figures import Figures
+    from dcmp_hil.telemetry.summary_sink import Figures
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,8 @@ from dcmp_hil.telemetry.rerun import viewer as window
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dcmp_hil.telemetry.audience import Sink
     from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.rerun.sink import RerunSink, Viewer
     from dcmp_hil.values import Event
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.ipc.mailbox import Mailbox
-    from dcmp_hil.telemetry.figures import Figures
+    from dcmp_hil.telemetry.summary_sink import Figures
 
 
 class Control(Protocol):

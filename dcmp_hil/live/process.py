@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.figures import Figures
+    from dcmp_hil.telemetry.summary_sink import Figures
 
 _START_TIMEOUT_S = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
 _POLL_PERIOD_S = 0.1  # s

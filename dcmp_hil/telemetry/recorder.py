@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.ipc.ring import Ring
-from dcmp_hil.telemetry.audience import Audience, Service, Sink
-from dcmp_hil.telemetry.link import LinkWatch
+from dcmp_hil.telemetry.dispatcher import Audience, Service, Sink
+from dcmp_hil.telemetry.link_events import LinkWatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.control.model import Model
-    from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.block import Aligner
+    from dcmp_hil.telemetry.telemetry_process import Apart
     from dcmp_hil.values import Cycle, Event, Truth
 
 __all__ = ["Recorder", "Sink"]

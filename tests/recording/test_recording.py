@@ -145,7 +145,7 @@ from pathlib import Path
 from dcmp_hil.platform.clock import pause
 from dcmp_hil.recording.about import about, rig_json
 from dcmp_hil.recording.writer import Recording
-from dcmp_hil.telemetry.audience import Audience, Service
+from dcmp_hil.telemetry.dispatcher import Audience, Service
 from dcmp_hil.ipc.ring import Ring
 from tests.helpers import bench
 import mmap

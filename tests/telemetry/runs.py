@@ -11,7 +11,7 @@ import numpy as np
 from dcmp_hil.control.model import Model
 from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.block import Aligner, Block
-from dcmp_hil.telemetry.keeper import Keeper
+from dcmp_hil.telemetry.memory_sink import Keeper
 from dcmp_hil.telemetry.rerun.rig_view import RigView
 from dcmp_hil.values import (
     UNKNOWN_TRUTH,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.keeper import Keeper
+from dcmp_hil.telemetry.memory_sink import Keeper
 from tests.telemetry.runs import feed
 
 pytest.importorskip("matplotlib")
 
-from dcmp_hil.telemetry.picture import draw_run, thinned
+from dcmp_hil.telemetry.run_plot import draw_run, thinned
 from dcmp_hil.telemetry.signals import ESTIMATE, REFERENCE
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.control.model import Model
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.link import DEVICE, HOST, LinkWatch, in_order
+from dcmp_hil.telemetry.link_events import DEVICE, HOST, LinkWatch, in_order
 from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns

@@ -17,7 +17,7 @@ from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.ring import FIELDS, Ring
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.telemetry.audience import Audience
+from dcmp_hil.telemetry.dispatcher import Audience
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun import sink as rerun_sink
 from dcmp_hil.telemetry.rerun import viewer as window

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.link import in_order
+from dcmp_hil.telemetry.link_events import in_order
 from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.rerun.histogram import Histogram
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.link import DEVICE, HOST
+from dcmp_hil.telemetry.link_events import DEVICE, HOST
 from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
 from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
 

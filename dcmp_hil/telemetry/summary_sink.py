@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.keeper import Keeper
+    from dcmp_hil.telemetry.memory_sink import Keeper
     from dcmp_hil.telemetry.statistics import Statistics
 
 _TROUBLES, _TEXT_CHARS_MAX = 100, 500  # characters

@@ -24,15 +24,15 @@ from dcmp_hil.ipc.shared_memory import Ledger, mapped
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.heap import trim
-from dcmp_hil.telemetry.audience import INTERVAL, Audience, Service
-from dcmp_hil.telemetry.died import how_it_died
-from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.dispatcher import INTERVAL, Audience, Service
+from dcmp_hil.telemetry.process_exit import how_it_died
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
+from dcmp_hil.telemetry.summary_sink import Figures, Lengths, SharedKeeper
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
-    from dcmp_hil.telemetry.audience import Sink
+    from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.statistics import Statistics
 
 UP, FIGURES, DONE = b"up", b"figures", b"done"

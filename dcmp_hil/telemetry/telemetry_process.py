@@ -26,9 +26,9 @@ from dcmp_hil.ipc.shared_memory import Ledger, mapped, reserve
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
-from dcmp_hil.telemetry.audience import Audience
-from dcmp_hil.telemetry.child import DONE, FIGURES, UP, Setup, State
-from dcmp_hil.telemetry.figures import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.dispatcher import Audience
+from dcmp_hil.telemetry.summary_sink import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.worker import DONE, FIGURES, UP, Setup, State
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ Rerun's allocator gives free pages back at once and not after a second: it holds
 _CODE = """
 import sys
 sys.path[:] = {path!r}
-from dcmp_hil.telemetry.child import main
+from dcmp_hil.telemetry.worker import main
 main({connection}, {setup}, {terminal})
 """
 

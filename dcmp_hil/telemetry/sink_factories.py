@@ -6,7 +6,7 @@ import pickle
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
-from dcmp_hil.telemetry.audience import Sink
+from dcmp_hil.telemetry.dispatcher import Sink
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
