@@ -11,7 +11,7 @@ import pytest
 from dcmp_hil.config import load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.settable import changed, doubts
+from dcmp_hil.live.tunables import changed, doubts
 from tests.helpers import bench
 from tools.typed_numbers import Typed, draw, judge
 

@@ -21,7 +21,7 @@ from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.rules import within_reason
 from dcmp_hil.errors import ConfigError, DcmpError, TripError
 from dcmp_hil.ipc.mailbox import Mailbox
-from dcmp_hil.live.settable import changed, settable
+from dcmp_hil.live.tunables import changed, settable
 from dcmp_hil.session import Session
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from dcmp_hil.cli import console
 from dcmp_hil.errors import DcmpError
 
 if TYPE_CHECKING:
-    from dcmp_hil.live.stopping import Stopped
+    from dcmp_hil.live.stop_command import Stopped
 
 Run = Annotated[int | None, typer.Option("--run", metavar="PID", help="Which run, where there are several.")]
 
@@ -47,7 +47,7 @@ def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
     """Say what became of STOP, and leave with its exit code."""
     if isinstance(stopped, DcmpError):
         raise stopped
-    from dcmp_hil.live.stopping import End
+    from dcmp_hil.live.stop_command import End
 
     pid, (end, said) = stopped
     sentence = f"the run of process {pid}: {said}"

@@ -8,8 +8,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError, DcmpError
-from dcmp_hil.live.places import mailbox_of, running, socket_of
-from dcmp_hil.live.stopping import LIMIT, End, Stopped, is_alive, stop_run
+from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of
+from dcmp_hil.live.stop_command import LIMIT, End, Stopped, is_alive, stop_run
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,12 +20,12 @@ from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
 from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
-from dcmp_hil.live.crowd import BETWEEN, PATIENCE, Crowd, listen
-from dcmp_hil.live.knobs import knobs
-from dcmp_hil.live.places import peer_of, socket_of
-from dcmp_hil.live.settable import changed, doubts
+from dcmp_hil.live.connection_limits import BETWEEN, PATIENCE, Crowd, listen
+from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.state import state_of
-from dcmp_hil.live.stopping import stop_run
+from dcmp_hil.live.stop_command import stop_run
+from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunables import changed, doubts
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.stop_request import SIGNALS, TAKEN
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.ipc.mailbox import Answer
-    from dcmp_hil.live.stopping import Stopped
+    from dcmp_hil.live.stop_command import Stopped
 
 _REQUEST_BYTES_MAX = 1 << 16  # bytes of a request
 _CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change

@@ -17,7 +17,7 @@ from aiohttp import web
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
-from dcmp_hil.live.stopping import End
+from dcmp_hil.live.stop_command import End
 from dcmp_hil.panel.door import BACKLOG, Door, Visit
 from dcmp_hil.panel.guard import Guard
 from dcmp_hil.panel.head import BODY_BYTES

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.places import running, socket_of
+from dcmp_hil.live.run_sockets import running, socket_of
 
 _SEARCH_PERIOD_S = 0.5  # s between two looks for a run
 _SILENCE_MAX_S = 1.0  # s without a state after which the page says so

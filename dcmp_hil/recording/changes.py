@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunables import changed
 from dcmp_hil.values import ChangeData
 
 if TYPE_CHECKING:

@@ -114,7 +114,7 @@ def test_fork_that_outlives_the_run_is_no_run(tmp_path: Path) -> None:
         until_running(run)
         until(lambda: len(_processes_of(tmp_path)) > 3, "it forked")
         run.kill()
-        until(lambda: places.running() == [], "no run is listed")
+        until(lambda: run_sockets.running() == [], "no run is listed")
 
 
 def _processes_of(folder: Path) -> list[int]:

@@ -21,8 +21,8 @@ import pytest
 from dcmp_hil import TripError, load_rig, run
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.knobs import knobs
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunables import changed
 from dcmp_hil.safety.chatter import FLOOR_V_S, Chatter, cause_of, limit_V_s
 from dcmp_hil.stop import Urgency
 from dcmp_hil.values import EventKind, Sample
@@ -172,7 +172,7 @@ def test_the_rule_is_right_such_gains_do_end_a_run_where_it_is_got_round(
 ) -> None:
     """As if the rule had let it pass: the run ends orderly all the same, or never exceeds what is allowed."""
     monkeypatch.setattr("dcmp_hil.config.loop_rules._fault", lambda _: None)
-    monkeypatch.setattr("dcmp_hil.live.settable.expected_variation", lambda _: 70.0)
+    monkeypatch.setattr("dcmp_hil.live.tunables.expected_variation", lambda _: 70.0)
     live = ChangedRun({2000: [override]}, duration=6.0)
     with pytest.raises(TripError) as caught:
         live.run()

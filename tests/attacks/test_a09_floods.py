@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import pytest
 
 from dcmp_hil.live.client import status, stop
-from dcmp_hil.live.places import socket_of
+from dcmp_hil.live.run_sockets import socket_of
 from tests.live.processes import BOUND, own_folder, started, until, until_running
 from tests.memory import peak_mb
 from tests.panel.browser import browser, needed

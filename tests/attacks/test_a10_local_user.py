@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.live.client import status
-from dcmp_hil.live.places import folder, socket_of
+from dcmp_hil.live.run_sockets import folder, socket_of
 from dcmp_hil.platform import other_users
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.telemetry.rerun.sink import RerunSink

@@ -16,7 +16,7 @@ import pytest
 from dcmp_hil import load_rig
 from dcmp_hil.device import open_errors
 from dcmp_hil.errors import ConfigError, OpenError
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunables import changed
 from dcmp_hil.platform.host_info import contention
 from sim_backend.board import build, build_cache
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.live import places
+from dcmp_hil.live import run_sockets
 from tests.installed import environment
 from tests.live.processes import BOUND, own_folder, runs, until, until_running
 
@@ -74,7 +74,7 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
         watchers = [socket.socket(socket.AF_UNIX) for _ in range(3)]
         for watcher in watchers:
             watcher.settimeout(BOUND)
-            watcher.connect(str(places.socket_of(run.pid)))
+            watcher.connect(str(run_sockets.socket_of(run.pid)))
         watchers[0].sendall(b'{"do": "watch"}\n')  # as a panel does; the second one asks for nothing
         watchers[2].sendall(b'{"do": "wat')  # in the middle of a request
         lines = watchers[0].makefile("rb")

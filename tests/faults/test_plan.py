@@ -13,7 +13,7 @@ import pytest
 from dcmp_hil import run
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.ipc.mailbox import APPLIED
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunables import changed
 from dcmp_hil.session import Session
 from sim_backend.faults.base import Number
 from sim_backend.faults.fault import KINDS, Fault

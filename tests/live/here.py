@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.control.change import Change
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.mailbox import Answer, Mailbox
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunables import changed
 from tests.helpers import HeldRun
 
 if TYPE_CHECKING:

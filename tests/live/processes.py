@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import status
-from dcmp_hil.live.places import peer_of, socket_of
+from dcmp_hil.live.run_sockets import peer_of, socket_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

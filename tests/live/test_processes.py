@@ -63,7 +63,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
     assert figures["ended_by"] == "STOP"
     assert len(figures["changes"]) == 1
     until(lambda: _gone(control), "the control process left", within=1.0)
-    assert places.running() == []
+    assert run_sockets.running() == []
 
 
 def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         os.kill(control_of(run.pid), signal.SIGKILL)
-        until(lambda: not places.running(), "its socket was cleaned up")
+        until(lambda: not run_sockets.running(), "its socket was cleaned up")
         assert run.poll() is None
         run.send_signal(signal.SIGINT)
         _, err = run.communicate(timeout=BOUND)
@@ -102,11 +102,11 @@ def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
         run.kill()
         run.communicate(timeout=BOUND)
         until(lambda: _gone(control), "the control process left", within=1.0)
-    assert places.running() == []
+    assert run_sockets.running() == []
 
 
 def test_run_says_why_it_does_not_listen_when_its_folder_is_not_its_own(tmp_path: Path) -> None:
-    places.folder().chmod(0o755)
+    run_sockets.folder().chmod(0o755)
     with started(tmp_path, *_RUN) as run:
         assert run.stderr is not None
         said = run.stderr.readline()
@@ -121,7 +121,7 @@ def test_run_does_not_listen_when_that_is_wanted(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN[:-4], "--duration", "0.5", "--no-control") as run:
         run.communicate(timeout=BOUND)
     assert run.returncode == 0
-    assert not any(places.folder().iterdir())
+    assert not any(run_sockets.folder().iterdir())
 
 
 def test_commands_say_so_when_there_is_no_run() -> None:
@@ -146,15 +146,15 @@ def test_several_runs_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_folder_is_refused_when_others_may_use_it() -> None:
-    places.folder().chmod(0o755)
+    run_sockets.folder().chmod(0o755)
     with pytest.raises(ConfigError, match="no folder of yours alone"):
-        places.folder()
+        run_sockets.folder()
 
 
 def test_what_a_dead_run_left_behind_is_removed() -> None:
-    left = places.socket_of(4_000_000)
+    left = run_sockets.socket_of(4_000_000)
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(left))
     assert left.exists()
-    assert places.running() == []
+    assert run_sockets.running() == []
     assert not left.exists()

@@ -9,8 +9,8 @@ import pytest
 from dcmp_hil.config.rig import Rig
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.knobs import knobs
-from dcmp_hil.live.settable import changed, settable
+from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunables import changed, settable
 from tests.helpers import bench, named
 
 if TYPE_CHECKING:

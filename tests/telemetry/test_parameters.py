@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil import load_rig
-from dcmp_hil.live.settable import changed
+from dcmp_hil.live.tunables import changed
 from dcmp_hil.telemetry.rerun.parameter_table import Parameters
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.rules import within_reason
 from dcmp_hil.config.units import in_words, split_unit
-from dcmp_hil.live.settable import allowed, settable, value_of
+from dcmp_hil.live.tunables import allowed, settable, value_of
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
