@@ -15,7 +15,7 @@ from dcmp_hil import load_rig
 from dcmp_hil.assembly import assemble
 from dcmp_hil.cli.onlookers import dashboard, recording
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.viewer import free_port

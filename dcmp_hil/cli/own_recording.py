@@ -15,10 +15,10 @@ from dcmp_hil.cli.outputs import json_place, try_places, write_each
 from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
-from dcmp_hil.recording.again import run_again
 from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.foreign import named_in
 from dcmp_hil.recording.reader import read_run, recording_in
+from dcmp_hil.recording.reexecute import run_again
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -28,7 +28,7 @@ from dcmp_hil.platform import process_log
 from dcmp_hil.platform.disk_space import room_for
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.plugins.exits import exits_named
-from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry.rerun import viewer as window
 

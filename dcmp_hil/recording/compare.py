@@ -9,8 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.recording.again import Again
     from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.recording.reexecute import Again
 
     Column = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.recording.again import Again
     from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.recording.reexecute import Again
 
 _ROW_GROUP = 1 << 16  # rows of a row group
 _REPLAYED_COLUMNS = (  # what a replay says a second time

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.recording.layout import CYCLE_SCHEMA, CYCLES, EVENTS
 from dcmp_hil.recording.records import HEAD, KNOWN, Op, RecordError, channel_in, schema_in
+from dcmp_hil.recording.schema import CYCLE_SCHEMA, CYCLES, EVENTS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

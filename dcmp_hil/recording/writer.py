@@ -14,7 +14,9 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.chunk_indices import ChunkIndices
-from dcmp_hil.recording.layout import (
+from dcmp_hil.recording.messages import log_times
+from dcmp_hil.recording.records import MAGIC
+from dcmp_hil.recording.schema import (
     ABOUT,
     CYCLE_SCHEMA,
     CYCLES,
@@ -28,8 +30,6 @@ from dcmp_hil.recording.layout import (
     event_to_bytes,
     to_bytes,
 )
-from dcmp_hil.recording.messages import log_times
-from dcmp_hil.recording.records import MAGIC
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -19,9 +19,9 @@ import pytest
 from dcmp_hil import run
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording import export
-from dcmp_hil.recording.about import about, rig_json
-from dcmp_hil.recording.again import run_again
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import RecordedRun, read_run
+from dcmp_hil.recording.reexecute import run_again
 from dcmp_hil.recording.writer import Recording
 from tests.attacks.mutations import KINDS, mutant, records
 from tests.helpers import bench

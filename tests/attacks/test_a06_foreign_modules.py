@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil import run
-from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench
 from tests.installed import environment

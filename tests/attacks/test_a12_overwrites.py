@@ -14,7 +14,7 @@ from dcmp_hil import run
 from dcmp_hil.cli.outputs import try_places
 from dcmp_hil.config import copy_rig
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.writer import Recording
 from tests.cli.conftest import cli
 from tests.helpers import bench

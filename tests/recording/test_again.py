@@ -12,11 +12,11 @@ import pytest
 
 from dcmp_hil import run
 from dcmp_hil.ipc.mailbox import APPLIED
-from dcmp_hil.recording.about import about, rig_json
-from dcmp_hil.recording.again import run_again
-from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.recording.compare import compare
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
+from dcmp_hil.recording.recorded_changes import changes_in
+from dcmp_hil.recording.reexecute import run_again
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench, named
 from tests.live.here import ChangedRun

@@ -17,13 +17,13 @@ import dcmp_hil
 import sim_backend
 from dcmp_hil import load_rig
 from dcmp_hil.cli.status import StatusLine
-from dcmp_hil.recording.about import about, rig_json
-from dcmp_hil.recording.again import run_again
-from dcmp_hil.recording.changes import changes_in
 from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.format_1 import event_of_format_1
-from dcmp_hil.recording.layout import event_from, event_to_bytes
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
+from dcmp_hil.recording.recorded_changes import changes_in
+from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.schema import event_from, event_to_bytes
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.telemetry.rerun.frames import Frames
 from dcmp_hil.telemetry.rerun.parameter_table import Parameters

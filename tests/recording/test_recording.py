@@ -23,8 +23,8 @@ from dcmp_hil import load_rig
 from dcmp_hil.config import load_table, shipped_rigs
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.ring import FIELDS, Ring, size_of
-from dcmp_hil.recording import layout
-from dcmp_hil.recording.about import about, git_state, rig_json
+from dcmp_hil.recording import schema
+from dcmp_hil.recording.metadata import about, git_state, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.session import Session
@@ -97,19 +97,19 @@ def test_ros_reads_every_number_of_every_period(tmp_path: Path) -> None:
     rows = np.concatenate([block.rows for block in recorded(tmp_path / "run.mcap")])
     with (tmp_path / "run.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        seen = [message for *_, message in reader.iter_decoded_messages(topics=[layout.CYCLES])]
-        logs = [json.loads(message.data) for *_, message in reader.iter_messages(topics=[layout.EVENTS])]
-    table = [[getattr(message, name) for name in layout.NAMES] for message in seen]
+        seen = [message for *_, message in reader.iter_decoded_messages(topics=[schema.CYCLES])]
+        logs = [json.loads(message.data) for *_, message in reader.iter_messages(topics=[schema.EVENTS])]
+    table = [[getattr(message, name) for name in schema.NAMES] for message in seen]
     np.testing.assert_array_equal(np.array(table), rows)
     assert [log["message"] for log in logs] == [event.text for event in EVENTS]
 
 
 def test_names_have_units_and_are_those_that_ros_allows() -> None:
-    assert len(layout.NAMES) == len(set(layout.NAMES)) == len(FIELDS)
+    assert len(schema.NAMES) == len(set(schema.NAMES)) == len(FIELDS)
     assert {"position_rad", "voltage_sent_v", "lateness_s", "disturbance_estimate_rad_s2"} <= set(
-        layout.NAMES
+        schema.NAMES
     )
-    assert all(name == name.lower() and "__" not in name for name in layout.NAMES)
+    assert all(name == name.lower() and "__" not in name for name in schema.NAMES)
 
 
 # ---------------------------------------------------------------------------------------------- cut off
@@ -143,7 +143,7 @@ _WRITES = """
 import sys
 from pathlib import Path
 from dcmp_hil.platform.clock import pause
-from dcmp_hil.recording.about import about, rig_json
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.telemetry.dispatcher import Audience, Service
 from dcmp_hil.ipc.ring import Ring

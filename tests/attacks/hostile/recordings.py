@@ -13,8 +13,8 @@ import zstandard
 from lz4 import frame as lz4  # type: ignore[import-untyped]
 
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.recording.about import rig_json
-from dcmp_hil.recording.layout import CYCLE_SCHEMA
+from dcmp_hil.recording.metadata import rig_json
+from dcmp_hil.recording.schema import CYCLE_SCHEMA
 from tests.helpers import bench
 
 MAGIC = b"\x89MCAP0\r\n"

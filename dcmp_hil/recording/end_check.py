@@ -7,8 +7,8 @@ import os
 import struct
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.recording.layout import END
 from dcmp_hil.recording.records import HEAD, MAGIC, Op, RecordError, attachment_in
+from dcmp_hil.recording.schema import END
 
 if TYPE_CHECKING:
     from pathlib import Path

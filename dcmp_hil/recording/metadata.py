@@ -14,7 +14,7 @@ from dcmp_hil.common.printable_text import readable
 from dcmp_hil.config.named import names_a_class
 from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.platform.host_info import host_facts
-from dcmp_hil.recording.layout import FORMAT
+from dcmp_hil.recording.schema import FORMAT
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
