@@ -8,9 +8,9 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from dcmp_hil.config.formatting import describe, toml_value
 from dcmp_hil.config.rig import KINDS, Rig
 from dcmp_hil.config.schema import rig_schema
-from dcmp_hil.config.words import describe, toml_value
 
 _ROOT = Path(__file__).parent.parent
 SCHEMA = _ROOT / "dcmp_hil/rigs/rig.schema.json"

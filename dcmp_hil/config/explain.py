@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.reach import beyond_reach
+from dcmp_hil.config.formatting import toml_value
+from dcmp_hil.config.reference_reach import beyond_reach
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
-from dcmp_hil.config.words import toml_value
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.paper import PaperSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound

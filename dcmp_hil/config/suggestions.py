@@ -7,9 +7,9 @@ import re
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.config.rig import KINDS, Rig
 from dcmp_hil.config.units import factor, in_words, split_unit, unit_named
-from dcmp_hil.config.words import toml_value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

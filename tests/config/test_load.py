@@ -259,8 +259,8 @@ def mutated(draw: st.DrawFn) -> tuple[dict[str, Any], set[str]]:
 def test_load_gives_rig_or_config_error_for_any_table(case: tuple[dict[str, Any], set[str]]) -> None:
     from pydantic import ValidationError
 
-    from dcmp_hil.config.messages import explain_faults
-    from dcmp_hil.config.words import dotted
+    from dcmp_hil.config.formatting import dotted
+    from dcmp_hil.config.validation_errors import explain_faults
 
     table, touched = case
     try:

@@ -12,8 +12,8 @@ import jsonschema
 import pytest
 
 from dcmp_hil.config import Rig, load_rig
+from dcmp_hil.config.formatting import dotted
 from dcmp_hil.config.schema import rig_schema
-from dcmp_hil.config.words import dotted
 from dcmp_hil.errors import ConfigError
 
 FOLDER = Path(__file__).parents[2] / "dcmp_hil/rigs"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.words import toml_value
+from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.values import ChangeData
 
 if TYPE_CHECKING:

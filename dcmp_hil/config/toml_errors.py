@@ -6,7 +6,7 @@ import re
 import tomllib
 from typing import Any
 
-from dcmp_hil.config.words import dotted, printable
+from dcmp_hil.config.formatting import dotted, printable
 from dcmp_hil.errors import ConfigError
 
 _LONGEST_NAME = 60

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel
 
 from dcmp_hil.config import suggestions
+from dcmp_hil.config.formatting import describe, dotted, toml_value
 from dcmp_hil.config.rig import KINDS, Rig
-from dcmp_hil.config.words import describe, dotted, toml_value
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
