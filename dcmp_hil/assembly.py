@@ -9,7 +9,7 @@ from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import controllers, observers
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.known_friction import KnownFriction
+from dcmp_hil.control.observers.friction_feedforward import KnownFriction
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory

@@ -12,7 +12,7 @@ from dcmp_hil.assembly import make_controller, make_observer
 from dcmp_hil.control.controllers import ControllerContext
 from dcmp_hil.control.model import Model
 from dcmp_hil.control.observers import ObserverContext
-from dcmp_hil.control.observers.known_friction import KnownFriction
+from dcmp_hil.control.observers.friction_feedforward import KnownFriction
 from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.control.references.periodic import Sine

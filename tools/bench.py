@@ -17,7 +17,7 @@ from unittest.mock import patch
 from dcmp_hil import load_rig, loop, run
 from dcmp_hil.assembly import assemble
 from dcmp_hil.control.observers import ObserverContext, super_twisting
-from dcmp_hil.control.observers.matched import copy_step, luenberger_copy
+from dcmp_hil.control.observers.discretisation import copy_step, luenberger_copy
 from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.platform.clock import SimulatedClock
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.control.observers.matched import Copy
+    from dcmp_hil.control.observers.discretisation import Copy
 
 _ROUNDS = 7
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dcmp_hil.control.observers.matched import luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import luenberger_copy, matched_gains
 from dcmp_hil.control.predictor import held_input
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dcmp_hil.control.observers.known_friction import KnownFriction
+from dcmp_hil.control.observers.friction_feedforward import KnownFriction
 from dcmp_hil.values import Estimate, Reference, Sample
 from tests.helpers import T, setting
 

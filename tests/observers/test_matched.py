@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.control.observers.matched import copy_step as series_step
-from dcmp_hil.control.observers.matched import luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import copy_step as series_step
+from dcmp_hil.control.observers.discretisation import luenberger_copy, matched_gains
 from tests.observers.matrix_observer import L1, L2, POLES, copy_step, gains, taylor
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive, Section
 from dcmp_hil.control.observers import standing_still
-from dcmp_hil.control.observers.matched import Gains, copy_step, luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import Gains, copy_step, luenberger_copy, matched_gains
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
