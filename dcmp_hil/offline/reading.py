@@ -10,21 +10,21 @@ import numpy as np
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import clock_times, is_clock, numbers
-from dcmp_hil.offline.choice import choose
+from dcmp_hil.offline.column_choice import choose
 from dcmp_hil.offline.inputs import held, undamaged
 from dcmp_hil.offline.recording import ColumnOptions, Recording
-from dcmp_hil.offline.stamps import Stamps, epoch_unit, rising
 from dcmp_hil.offline.table import read_table
-from dcmp_hil.offline.turns import Motion, continuous, moduli
+from dcmp_hil.offline.timestamps import Stamps, epoch_unit, rising
 from dcmp_hil.offline.units import COUNTS, known_unit
+from dcmp_hil.offline.unwrapping import Motion, continuous, moduli
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from dcmp_hil.offline.choice import Columns
-    from dcmp_hil.offline.names import Match
+    from dcmp_hil.offline.column_choice import Columns
+    from dcmp_hil.offline.column_names import Match
     from dcmp_hil.offline.table import Table
 
     Column = NDArray[np.float64]

@@ -12,9 +12,9 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.offline.names import Match
+    from dcmp_hil.offline.column_names import Match
     from dcmp_hil.offline.settings import InputKind
-    from dcmp_hil.offline.turns import Modulus
+    from dcmp_hil.offline.unwrapping import Modulus
 
 _FEWEST_ROWS = 20
 _VALUE_MAX = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import is_clock, is_value, label_in, number, unit_in
+from dcmp_hil.offline.column_names import known_in
 from dcmp_hil.offline.decoding import read_lines
-from dcmp_hil.offline.layout import (
+from dcmp_hil.offline.dialect import (
     BLANK,
     COMMENT,
     HALF,
@@ -20,7 +21,6 @@ from dcmp_hil.offline.layout import (
     prepared,
     split,
 )
-from dcmp_hil.offline.names import known_in
 from dcmp_hil.offline.units import any_unit
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dcmp_hil.offline.decoding import Lines
-    from dcmp_hil.offline.layout import Layout
+    from dcmp_hil.offline.dialect import Layout
 
 Line = tuple[int, str]  # its number in the file, from 1, and its text
 

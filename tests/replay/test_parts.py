@@ -21,7 +21,7 @@ from dcmp_hil.offline import (
     write_rrd,
     zero_phase,
 )
-from dcmp_hil.offline.names import match
+from dcmp_hil.offline.column_names import match
 from dcmp_hil.offline.resolution import equivalent_counts_per_rev
 from tests.replay.synthetic import swing
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import is_clock, numbers
-from dcmp_hil.offline.layout import HALF
-from dcmp_hil.offline.names import listed, match, sample_number, split_time
+from dcmp_hil.offline.column_names import listed, match, sample_number, split_time
+from dcmp_hil.offline.dialect import HALF
 
 if TYPE_CHECKING:
-    from dcmp_hil.offline.names import Match
+    from dcmp_hil.offline.column_names import Match
     from dcmp_hil.offline.recording import ColumnOptions
     from dcmp_hil.offline.table import Table
     from dcmp_hil.offline.units import Quantity

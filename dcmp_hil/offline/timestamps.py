@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.offline.even import even_rows
+from dcmp_hil.offline.even_sampling import even_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
