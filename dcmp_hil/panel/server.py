@@ -18,11 +18,11 @@ from aiohttp import web
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
 from dcmp_hil.live.stop_command import End
-from dcmp_hil.panel.door import BACKLOG, Door, Visit
-from dcmp_hil.panel.guard import Guard
-from dcmp_hil.panel.head import BODY_BYTES
-from dcmp_hil.panel.quiet import quiet
-from dcmp_hil.panel.watcher import Watcher
+from dcmp_hil.panel.access_control import Guard
+from dcmp_hil.panel.admission import BACKLOG, Door, Visit
+from dcmp_hil.panel.log_filter import quiet
+from dcmp_hil.panel.request_head import BODY_BYTES
+from dcmp_hil.panel.run_follower import Watcher
 from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:

@@ -10,13 +10,13 @@ import asyncio
 from http import HTTPStatus
 from typing import TYPE_CHECKING
 
-from dcmp_hil.panel.head import RequestError, head_of
+from dcmp_hil.panel.request_head import RequestError, head_of
 from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.panel.head import Head
+    from dcmp_hil.panel.request_head import Head
 
 WAITING, SERVED = 256, 64
 """Connections without a whole request, and with one."""
