@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import load_rig
 from dcmp_hil.assembly import assemble
-from dcmp_hil.cli.onlookers import dashboard, recording
+from dcmp_hil.cli.run_sinks import dashboard, recording
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.session import Session

@@ -20,6 +20,6 @@ def export(
     force: Force = False,
 ) -> None:
     """Write a run's recording as CSV, Parquet, or a Rerun recording; nothing that it names is imported."""
-    from dcmp_hil.cli.own_recording import write_exports
+    from dcmp_hil.cli.recorded_run import write_exports
 
     write_exports(file, csv=csv, parquet=parquet, rrd=rrd, force=force)

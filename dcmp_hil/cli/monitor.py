@@ -22,7 +22,7 @@ def monitor(
     A serial port has one reader: while a run has it, this says so and ends. An slcan adapter that is closed
     stays silent, for only a command opens it: let slcand do so, and watch its socketcan interface.
     """
-    from dcmp_hil.cli.monitoring import watch
+    from dcmp_hil.cli.execute_monitor import watch
     from dcmp_hil.config import load_rig
 
     raise typer.Exit(watch(load_rig(rig, overrides or ()), duration, all_frames=all_frames))

@@ -32,8 +32,8 @@ def panel(
     if viewer and (parts.scheme not in {"http", "https"} or not parts.netloc):
         raise ConfigError(f"--viewer {viewer}: expected a URL such as http://127.0.0.1:9090.")
     if web:
-        from dcmp_hil.cli.viewing import find_served
-        from dcmp_hil.cli.watching import pages
+        from dcmp_hil.cli.execute_view import find_served
+        from dcmp_hil.cli.viewer import pages
 
         with pages(find_served()) as address:
             _serve(port, run, address)

@@ -186,7 +186,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     (time, position, torque ...), units by the name's end (position_deg); options say what names do not.
     A run of dcmp-hil goes through its observer and controller again, with other gains if you name some.
     """
-    from dcmp_hil.cli import replaying
+    from dcmp_hil.cli import execute_replay
     from dcmp_hil.cli.replay_options import Given
 
     given = Given(
@@ -208,12 +208,12 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         figures={"start": window_from, "cutoff": cutoff},
         overrides=tuple(overrides or ()),
     )
-    outputs = replaying.Outputs(
+    outputs = execute_replay.Outputs(
         json=json_file, csv=csv, rrd=rrd, by_default=not no_write, force=force, rig=rig
     )
     if file.suffix == ".mcap" or file.is_dir():
-        from dcmp_hil.cli.own_recording import replay_own
+        from dcmp_hil.cli.recorded_run import replay_own
 
         replay_own(file, given, outputs, trust=trust)
     else:
-        replaying.execute(file, given.column_options(), given.settings(), outputs)
+        execute_replay.execute(file, given.column_options(), given.settings(), outputs)

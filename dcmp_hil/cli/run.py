@@ -73,7 +73,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
 
     Ctrl-C ends it at 0 V and keeps what was recorded.
     """
-    from dcmp_hil.cli.running import Options, execute
+    from dcmp_hil.cli.execute_run import Options, execute
 
     options = Options(
         duration=duration,

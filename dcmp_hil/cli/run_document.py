@@ -12,7 +12,7 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.cli.kept_recording import Kept
+    from dcmp_hil.cli.recording_check import Kept
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 

@@ -16,6 +16,6 @@ def view(
     ] = False,
 ) -> None:
     """Attach a viewer to a run that goes on with --viewer spawn, serve or web."""
-    from dcmp_hil.cli.viewing import attach
+    from dcmp_hil.cli.execute_view import attach
 
     attach(port, web=web)

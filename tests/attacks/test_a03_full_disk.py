@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.cli.kept_recording import kept_in, space_warning
+from dcmp_hil.cli.recording_check import kept_in, space_warning
 from dcmp_hil.errors import IncompleteError
 from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.end_check import ending_of

@@ -251,7 +251,7 @@ def test_ports_and_monitor_close_what_could_not_be_opened(cli: Cli, monkeypatch:
         def close(self) -> None:
             closed.append(self.name)
 
-    for room in ("dcmp_hil.device.discovery", "dcmp_hil.cli.monitoring"):
+    for room in ("dcmp_hil.device.discovery", "dcmp_hil.cli.execute_monitor"):
         monkeypatch.setattr(f"{room}.make_link", lambda *_: Broken())
     assert cli("ports", "/dev/ttyX").code == 0
     assert closed

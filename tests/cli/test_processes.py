@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from dcmp_hil.cli.onlookers import dashboard, status_line
+from dcmp_hil.cli.run_sinks import dashboard, status_line
 from tests.telemetry.runs import entities
 
 _BOUND = 60.0  # s: generous, these machines are shared

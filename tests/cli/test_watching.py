@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.cli.onlookers import dashboard
-from dcmp_hil.cli.viewing import attach
-from dcmp_hil.cli.watching import chosen, open_browser, pages
+from dcmp_hil.cli.execute_view import attach
+from dcmp_hil.cli.run_sinks import dashboard
+from dcmp_hil.cli.viewer import chosen, open_browser, pages
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.sink import RerunSink
@@ -138,7 +138,7 @@ def test_no_browser_is_a_sentence(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":99")
-    monkeypatch.setattr("dcmp_hil.cli.watching.display_problem", lambda: "")
+    monkeypatch.setattr("dcmp_hil.cli.viewer.display_problem", lambda: "")
     monkeypatch.setattr("webbrowser.open", lambda _: False)
     open_browser("http://127.0.0.1")
     assert "No browser was found; open the address above in one." in said(capsys)
@@ -153,7 +153,7 @@ def test_view_finds_the_run_and_opens_a_window(
     opened: list[int] = []
     monkeypatch.setenv("DISPLAY", ":99")
     monkeypatch.setattr(window, "start_viewer", opened.append)
-    monkeypatch.setattr("dcmp_hil.cli.viewing.display_problem", lambda: "")
+    monkeypatch.setattr("dcmp_hil.cli.execute_view.display_problem", lambda: "")
     attach(None, web=False)
     assert opened == [run.port]
     assert "the run goes on" in said(capsys)
@@ -191,7 +191,7 @@ def test_a_page_ends_with_its_run(run: RerunSink, monkeypatch: pytest.MonkeyPatc
         looks.append(window.answers(_FIRST + 500, 0.1))
         run.close()
 
-    monkeypatch.setattr("dcmp_hil.cli.viewing.pause", look)
+    monkeypatch.setattr("dcmp_hil.cli.execute_view.pause", look)
     attach(run.port, web=True)
     assert looks[0]
     assert not window.answers(_FIRST + 500, 0.1)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.onlookers import use_terminal
+from dcmp_hil.cli.run_sinks import use_terminal
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.watching import web_viewer
+from dcmp_hil.cli.viewer import web_viewer
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import pause
 from dcmp_hil.platform.display import display_problem

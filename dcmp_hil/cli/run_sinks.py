@@ -39,7 +39,7 @@ def recording(path: Path, period: float, run: dict[str, str], rig: str) -> Sink:
 
 def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:
     """Return the Rerun dashboard, its recording, or both; say where a viewer finds it."""
-    from dcmp_hil.cli.watching import watched
+    from dcmp_hil.cli.viewer import watched
     from dcmp_hil.telemetry.rerun.sink import RerunSink  # takes half a second
 
     use_terminal()

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from dcmp_hil.cli.execute_replay import Outputs
     from dcmp_hil.cli.replay_options import Given
-    from dcmp_hil.cli.replaying import Outputs
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.compare import Comparison
     from dcmp_hil.recording.reader import RecordedRun

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.foreign_lines import split_stderr
-from dcmp_hil.cli.kept_recording import kept_in, space_warning
-from dcmp_hil.cli.onlookers import dashboard, dashboard_replacing, recording, status_line
+from dcmp_hil.cli.orphaned_run import Unattended
 from dcmp_hil.cli.outputs import json_place, try_places
+from dcmp_hil.cli.recording_check import kept_in, space_warning
 from dcmp_hil.cli.run_document import run_document, write_json
 from dcmp_hil.cli.run_folder import RunFolder
+from dcmp_hil.cli.run_sinks import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.summary import summary_table
-from dcmp_hil.cli.unattended import Unattended
-from dcmp_hil.cli.watching import chosen
+from dcmp_hil.cli.viewer import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.control.references.table import Table
