@@ -124,7 +124,7 @@ def test_what_a_job_raised_reaches_the_next_caller() -> None:
 _LAZY = """
 import sys
 from dcmp_hil.ipc import ring
-from dcmp_hil.telemetry import block, picture, recorder, signals
+from dcmp_hil.telemetry import block, recorder, run_plot, signals
 sys.exit(bool({"rerun", "matplotlib"} & set(sys.modules)))
 """
 
