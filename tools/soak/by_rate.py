@@ -20,16 +20,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dcmp_hil import load_rig
-from dcmp_hil.cli.onlookers import recording
-from dcmp_hil.live.places import socket_of
+from dcmp_hil.cli.run_sinks import recording
 from dcmp_hil.live.process import ControlProcess
-from dcmp_hil.recording.about import about, rig_json
-from dcmp_hil.telemetry.apart import Apart
-from dcmp_hil.telemetry.makers import sorted_out
+from dcmp_hil.live.run_sockets import socket_of
+from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.viewer import free_port
+from dcmp_hil.telemetry.sink_factories import sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
+from dcmp_hil.telemetry.telemetry_process import Apart
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 from tools.soak.source import Leak, Source, a_minute, events
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.makers import SinkMaker
+    from dcmp_hil.telemetry.sink_factories import SinkMaker
 
 _FIRST_PORT = 30_000
 _WAITING_ROWS_MAX = 8_000  # a quarter of the ring
