@@ -18,13 +18,13 @@ from dcmp_hil.ipc.mailbox import SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
-from dcmp_hil.live import stopping
+from dcmp_hil.live import stop_command
 from dcmp_hil.live.control import Server, Setup
-from dcmp_hil.live.stopping import End, stop_run
+from dcmp_hil.live.stop_command import End, stop_run
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import Interrupted, StopRequest
-from dcmp_hil.telemetry.died import how_it_died
+from dcmp_hil.telemetry.process_exit import how_it_died
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 from tests.live.here import ChangedRun
@@ -94,7 +94,7 @@ def test_stop_that_changes_nothing_is_told_as_failed(monkeypatch: pytest.MonkeyP
     stopped = stop_run(1 << 22, Mailbox(), lambda: True)
     assert stopped.end is End.FAILED
     assert sent == [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
-    assert stopping.LIMIT >= 1.0
+    assert stop_command.LIMIT >= 1.0
 
 
 class _Owner:

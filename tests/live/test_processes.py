@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live import client, places
-from dcmp_hil.live.stopping import End
+from dcmp_hil.live import client
+from dcmp_hil.live.stop_command import End
 from tests.live.processes import BOUND, control_of, started, until, until_running
 
 pytestmark = pytest.mark.usefixtures("own_run_folder")

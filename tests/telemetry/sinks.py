@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import signal
     from collections.abc import Callable
 
-    from dcmp_hil.telemetry.apart import Apart
     from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.telemetry_process import Apart
 
 T = 1e-3  # s
 BOUND_S = 60.0  # s: generous, these machines are shared

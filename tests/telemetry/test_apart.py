@@ -17,9 +17,9 @@ import pytest
 
 from dcmp_hil import ConfigError, run
 from dcmp_hil.session import Session
-from dcmp_hil.telemetry import apart as module
-from dcmp_hil.telemetry.apart import Apart
+from dcmp_hil.telemetry import telemetry_process as module
 from dcmp_hil.telemetry.statistics import Statistics
+from dcmp_hil.telemetry.telemetry_process import Apart
 from dcmp_hil.values import Event, EventKind
 from tests.helpers import bench
 from tests.telemetry.sinks import Notes, Refuses, Sleeps, Strikes, T, fill, noted, strike_all
