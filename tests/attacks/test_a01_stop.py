@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from dcmp_hil.live import run_sockets
 from dcmp_hil.recording.reader import read_run
 from tests.live.processes import BOUND, control_of, started, until, until_running
 from tools.stop_bars.attack import attack

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live import client
+from dcmp_hil.live import client, run_sockets
 from dcmp_hil.live.stop_command import End
 from tests.live.processes import BOUND, control_of, started, until, until_running
 
