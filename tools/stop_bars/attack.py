@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.places import mailbox_of, running
-from dcmp_hil.live.stopping import LIMIT, is_alive
+from dcmp_hil.live.run_sockets import mailbox_of, running
+from dcmp_hil.live.stop_command import LIMIT, is_alive
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.recording.reader import read_run
 from tools.hosts import BOUND_S, wait

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil import load_rig
-from dcmp_hil.live.stopping import is_alive
+from dcmp_hil.live.stop_command import is_alive
 from dcmp_hil.platform.clock import MonotonicClock
 from sim_backend.board.virtual_device import VirtualDevice
 from tools.hosts import BOUND_S, wait
