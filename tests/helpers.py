@@ -53,7 +53,7 @@ def named(make: Callable[..., Any]) -> str:
 
 
 def known(value: float | None) -> float:
-    """Return a figure that must be known."""
+    """Return a figure; fail if it is None."""
     assert value is not None
     return value
 
@@ -143,7 +143,7 @@ class LostPower(FaultySim):
 
 
 class Reversed(FaultySim):
-    """The motor turns the other way."""
+    """A plant whose motor turns in the wrong direction."""
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
         super().__init__(rig, clock)
@@ -204,7 +204,7 @@ class DemandedVoltage(SimBackend):
 
 
 class LosesSamples(SimBackend):
-    """One sample in twenty never arrives."""
+    """A backend that loses one sample in twenty."""
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
         super().__init__(rig, clock)

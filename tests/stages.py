@@ -15,7 +15,7 @@ def texts_of(result: Result) -> list[str]:
 
 
 class ZeroController:
-    """A controller that asks for nothing."""
+    """A controller that requests 0 V."""
 
     def __init__(self, setting: object) -> None:
         pass
@@ -25,7 +25,7 @@ class ZeroController:
 
 
 class ObserverAtRest:
-    """An observer that always sees the same."""
+    """An observer whose estimate is always at rest."""
 
     def __init__(self, setting: object) -> None:  # noqa: ARG002 - a rig's observer is made with it
         self.calls = 0

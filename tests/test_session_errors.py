@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class _Boom(BaseException):
-    """Not even an Exception."""
+    """An exception that is not derived from Exception."""
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, SystemExit, _Boom, LinkError])

@@ -37,7 +37,7 @@ def paths(of: Table) -> list[Path]:
 
 
 def violations(of: Table) -> list[str]:
-    """Return what does not hold of a table."""
+    """Return the requirements that a table violates."""
     every = paths(of)
     wrong = []
     if of[Phase.TRIPPED]:

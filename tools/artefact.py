@@ -61,7 +61,7 @@ def release(built: Path, target: Path, sizes: dict[str, dict[str, int]]) -> dict
 
 
 def main() -> int:
-    """Build, copy, and say how large it is."""
+    """Build the artefact, copy it, and print its size."""
     parser = argparse.ArgumentParser(prog="python -m tools.artefact", description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", default=Path("dist/firmware"))
     folder = parser.parse_args().folder.resolve()

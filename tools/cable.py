@@ -37,7 +37,7 @@ class Cable:
         self._thread = threading.Thread(target=self._carry, name="cable", daemon=True)
 
     def __enter__(self) -> Self:
-        """Plug it in."""
+        """Plug the cable in."""
         self._thread.start()
         return self
 

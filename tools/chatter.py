@@ -43,7 +43,7 @@ _REFERENCES = (
 
 
 class Figure(NamedTuple):
-    """What came of a run."""
+    """Result of one run."""
 
     name: str
     ratio: float  # largest mean of |dV/dt| over half a second, over what is allowed

@@ -65,7 +65,7 @@ class Line:
         return {**vars(self), "outcomes": dict(self.outcomes), "right_percent": self.right_percent}
 
     def __str__(self) -> str:
-        """Return it as Markdown."""
+        """Return the row in Markdown."""
         times = self.reactions_ms
         median, most = (f"{statistics.median(times):.0f}", f"{max(times):.0f}") if times else ("", "")
         bound = "" if self.bound_ms is None else f"{self.bound_ms:g}"
@@ -85,7 +85,7 @@ def run_row(place: int, seeds: Sequence[int]) -> Line:
 
 
 def run_healthy(seeds: Sequence[int]) -> Line:
-    """Run some healthy seeds."""
+    """Run healthy seeds; return the row of the table."""
     line = Line("none")
     for seed in seeds:
         line.add(seed, healthy(seed))

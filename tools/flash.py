@@ -37,7 +37,7 @@ _NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
 
 
 class Piece(NamedTuple):
-    """What is written where."""
+    """Data of one piece, and its address."""
 
     file: Path
     address: int
@@ -177,7 +177,7 @@ def _run(command: list[str]) -> None:
 
 
 def main() -> int:
-    """Write, or show what would."""
+    """Write the pieces to the board, or print them."""
     asked = _arguments()
     with tempfile.TemporaryDirectory() as folder:
         try:

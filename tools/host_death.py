@@ -52,7 +52,7 @@ class Death(NamedTuple):
 
     @property
     def wrong(self) -> list[str]:
-        """What is not as it must be."""
+        """Requirements that the result violates."""
         fault, codes = WAYS[self.way]
         if self.way == "SIGKILL" and self.seen_us == 0 and self.fault == "HOST_SILENT":
             fault = "HOST_SILENT"  # a busy computer took longer to end the process than the watchdog takes

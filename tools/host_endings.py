@@ -74,7 +74,7 @@ class Observer(_Raises):
 
 
 class Way(NamedTuple):
-    """One way to end a host."""
+    """A way to end a host."""
 
     code: int  # with which it must leave
     number: signal.Signals | None = None  # sent to it
@@ -123,7 +123,7 @@ class Ending(NamedTuple):
 
     @property
     def own_us(self) -> int:
-        """What its own doing took, at least."""
+        """Time that the host itself took, at least, us."""
         return self.off_us - self.doubt_us - self.waited_us
 
     @property
@@ -133,7 +133,7 @@ class Ending(NamedTuple):
 
     @property
     def wrong(self) -> list[str]:
-        """What is not as it must be."""
+        """Requirements that the result violates."""
         code, left = WAYS[self.way].code, WAYS[self.way].left
         return [
             *([f"0 V after {1e-3 * self.own_us:.1f} ms"] if self.own_us > OFF_US else []),

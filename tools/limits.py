@@ -22,7 +22,7 @@ _SHOWN = 5
 
 
 class Cell(NamedTuple):
-    """Attacks that differ in the seed alone."""
+    """Attacks that differ only in their seed."""
 
     by: str
     limit: float

@@ -23,7 +23,7 @@ _CONFIG = (
 
 
 class RecordLink(IntEnum):
-    """What a board's host is connected to."""
+    """Kinds of link between a board and its host."""
 
     cobs, slcan, can = range(3)
 
@@ -38,7 +38,7 @@ def record(
     boot_count: int = 0,
     sequence: int = 1,
 ) -> bytes:
-    """Return one record.
+    """Return the bytes of one record.
 
     Parameters
     ----------

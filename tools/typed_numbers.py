@@ -49,7 +49,7 @@ _BEYOND = 1.001  # times a limit: a sample may be that far on before the trip
 
 
 class Typed(NamedTuple):
-    """One number and where it is typed."""
+    """A number, and the place where it is typed."""
 
     kinds: tuple[str, ...]
     override: str
@@ -57,7 +57,7 @@ class Typed(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What became of it."""
+    """Result of typing a number."""
 
     end: str  # "refused", "not taken", "ended normally", or the reason of a trip
     position: float  # of the limit, the arm's own largest
@@ -142,7 +142,7 @@ class _Setter:
 
 
 def judge(typed: Typed) -> Outcome:
-    """Run it."""
+    """Type the number; return the result."""
     nothing = Outcome("refused", 0.0, 0.0)
     try:
         rig = load_rig("bench-1khz", typed.kinds if typed.at is not None else (*typed.kinds, typed.override))

@@ -36,7 +36,7 @@ _NOISE_SIGMAS = 4.5  # the simulated noise is Gaussian; a difference of two has 
 
 
 class Outcome(NamedTuple):
-    """What became of an attack."""
+    """Result of an attack."""
 
     speed: float  # rad/s, of the simulated arm at the instant from which on its voltage is 0
     position: float  # rad, at the same instant
@@ -56,7 +56,7 @@ class Witness:
             self._tick, self._board.tick = self._board.tick, self._watched_tick
 
     def read(self) -> Sample:
-        """Read on."""
+        """Return the next sample."""
         sample = self._backend.read()
         if self._board is None:
             self.seen.append((sample.voltage, self._backend.truth()))
@@ -70,7 +70,7 @@ class Witness:
 
 
 class NoStop:
-    """The run is not asked to end."""
+    """A stop that is never requested."""
 
     requested = False
 
@@ -134,7 +134,7 @@ def most_speed(rig: Rig, by: str) -> float:
 
 
 class Healthy(NamedTuple):
-    """What became of a healthy run."""
+    """Result of a healthy run."""
 
     reason: str  # "completed" if it did
     speed: float  # rad/s, the fastest that the simulated arm was

@@ -14,7 +14,7 @@ _MAGIC = 8
 
 
 class Mutant(NamedTuple):
-    """A recording with one blow.
+    """A recording with one mutation.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def records(content: bytes) -> list[tuple[int, int, int]]:
 
 
 def mutant(content: bytes, other: bytes, chance: random.Random) -> Mutant:
-    """Deal one blow.
+    """Return a recording with one random mutation.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _swapped(content: bytes, _: bytes, chance: random.Random) -> bytes:
 
 
 def _doubled(content: bytes, _: bytes, chance: random.Random) -> bytes:
-    """Write a sector over another one."""
+    """Return the content with one sector copied over another."""
     size = chance.choice([512, 4096])
     a, b = (size * chance.randrange(len(content) // size) for _n in range(2))
     return content[:b] + content[a : a + size] + content[b + size :]

@@ -118,7 +118,7 @@ def test_fork_that_outlives_the_run_is_no_run(tmp_path: Path) -> None:
 
 
 def _processes_of(folder: Path) -> list[int]:
-    """Return the processes that work in a folder."""
+    """Return the processes whose working folder is `folder`."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         try:

@@ -44,7 +44,7 @@ OLDER = Path(__file__).parents[1] / "recording" / "data" / "format_1.mcap"
 
 @dataclass(frozen=True)
 class Original:
-    """A recording as it was written.
+    """A recording before mutation.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class _Disk:
 
 
 class _Fickle:
-    """The file on it."""
+    """A file on a disk that is full at times."""
 
     def __init__(self, path: Path, disk: _Disk) -> None:
         self._file, self._disk, self._begun = path.open("wb", buffering=0), disk, False

@@ -69,7 +69,7 @@ def test_what_is_there_is_overwritten_with_force_alone(
 
 
 def _names(file: Path) -> dict[str, str]:
-    """Return other names for one file."""
+    """Return other names of one file: links and other spellings."""
     (file.parent / "soft").symlink_to(file)
     (file.parent / "hard").hardlink_to(file)
     (file.parent / "folder").mkdir()

@@ -27,7 +27,7 @@ _LOCKED = {"BDTR": 0x7FFF, "CR2": 0x0300, "CCER": 0x0002, "CCMR1_Output": 0x0070
 
 
 def late_ticks(system: System) -> int:
-    """Return what the newest HEALTH counts."""
+    """Return `late_ticks` of the newest HEALTH."""
     system.usart.sent.clear()
     system.run_for(120_000.0)
     said = [unpack(frame, 0) for frame in cobs.Receiver().feed(b"\0" + bytes(system.usart.sent))]

@@ -1,4 +1,4 @@
-"""Real processes: signals, and what stays behind."""
+"""Real processes: signals, and the files that remain."""
 
 import json
 import pickle

@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parents[2] / "dcmp_hil/rigs"
 
 
 def fault(source: str, *overrides: str) -> str:
-    """Load what must not load; return the words."""
+    """Load a rig that must be refused; return the error message."""
     with pytest.raises(ConfigError) as caught:
         load_rig(source, overrides)
     assert caught.value.exit_code == 2

@@ -53,7 +53,7 @@ VALUES: tuple[Any, ...] = (
 
 
 def toml(value: Any) -> str:
-    """Write a value as TOML, tables inline."""
+    """Return a value in TOML, with inline tables."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

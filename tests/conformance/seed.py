@@ -15,7 +15,7 @@ class Seed(ReferenceDevice):
         self.sow()
 
     def sow(self) -> None:
-        """Change what the constructor made."""
+        """Change the object after its constructor."""
 
 
 Row = tuple[type[Seed], str, str]

@@ -23,7 +23,7 @@ class Outbox(wire.Outbox):
 
 
 def spoil_line(cls: type[wire.Line], **changed: Any) -> type[wire.Line]:
-    """Return a carrier with other methods."""
+    """Return a copy of the codec with some methods replaced."""
     return type("Spoilt", (cls,), changed)
 
 

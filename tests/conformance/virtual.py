@@ -70,7 +70,7 @@ class BytePort:
 
 
 class FramePort:
-    """Frames both ways: what a CAN bus is."""
+    """A port that carries frames in both directions, as a CAN bus does."""
 
     name, carrier, damaged = "virtual", "can", 0
 

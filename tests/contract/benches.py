@@ -42,7 +42,7 @@ class PatientClock(MonotonicClock):
 
 
 class Bench:
-    """A rig and the board behind it.
+    """A rig with its backend and board.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Bench:
 
     @property
     def board(self) -> Board:
-        """The board, on every bench that has one."""
+        """Return the board of the bench."""
         assert self._board is not None
         return self._board
 

@@ -15,7 +15,7 @@ class _Counter:
         """Do nothing: the test turns the encoder."""
 
     def count(self) -> int:
-        """Return what the encoder shows."""
+        """Return the encoder's count."""
         return self.counts & 0xFFFF_FFFF
 
 

@@ -28,7 +28,7 @@ class Port(Protocol):
         ...
 
     def close(self) -> None:
-        """Close this end."""
+        """Close the host's end of the line."""
         ...
 
 
@@ -106,7 +106,7 @@ class Pump(threading.Thread):
             self.port.exchange(self.board, self.patience if self.board.enable else _BRISK)
 
     def close(self) -> None:
-        """Stop, and wait until it has."""
+        """Stop the thread, and wait for its end."""
         self._ending.set()
         self.join(5.0)
         assert not self.is_alive()

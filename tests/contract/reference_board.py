@@ -19,7 +19,7 @@ _BUILT = (
 
 
 class ReferenceBoard(ReferenceDevice):
-    """What sim_backend.board.board.Board is to the firmware."""
+    """The counterpart of `sim_backend.board.board.Board` for this device."""
 
     def __init__(
         self, rig: Rig, *, carrier: str, count_offset: int = 0, start_us: int = 0, first_tick: int = 0
@@ -39,7 +39,7 @@ class ReferenceBoard(ReferenceDevice):
         super().tick(self.pins.count())
 
     def reset(self) -> None:
-        """Start anew, the plant as it is."""
+        """Reset the device; the plant keeps its state."""
         self.first_tick, self.start_us = 0, self.now_us
         self.__post_init__()
 

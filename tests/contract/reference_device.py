@@ -72,7 +72,7 @@ class ReferenceDevice:
 
     @property
     def applied_mV(self) -> int:
-        """What the amplifier puts out now."""
+        """Output voltage of the amplifier, mV."""
         return int(self._output_uV / 1000)
 
     @property
@@ -94,7 +94,7 @@ class ReferenceDevice:
         return answers + self._line.pack(self.transmit_frames()) if self._link_up else b""
 
     def receive_frame(self, id: int, data: bytes) -> None:  # noqa: A002 - the interface's word
-        """Take one frame from the host."""
+        """Process one frame from the host."""
         number, node = divmod(id, 16)
         if node != self.node or number not in wire.TO_DEVICE or len(data) != wire.LENGTHS[number]:
             return
@@ -126,7 +126,7 @@ class ReferenceDevice:
             self._trip(wire.HOST_SILENT, self._silent_us())
 
     def link(self, up: bool) -> None:
-        """Hang the line up, or put it back."""
+        """Set the link up or down."""
         if self._link_up and not up:
             self._bus_offs += self.carrier == "can"
             self._outbox.answers.clear()
@@ -135,7 +135,7 @@ class ReferenceDevice:
         self._link_up = up
 
     def tick(self, counts: int) -> None:
-        """One period ends, the next one begins."""
+        """End one period and begin the next."""
         self._pass(self.period_us)
         if self.state == BOOT:
             self.state = IDLE

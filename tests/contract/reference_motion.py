@@ -32,7 +32,7 @@ class Motion:
         self._now = 0
 
     def armed(self) -> None:
-        """Travel is counted from where this happens first."""
+        """Note an arming; travel is measured from the first one."""
         self._zero = self._travelled() if self._zero is None else self._zero
 
     def latch(self, counts: int, tick: int, built_speed: int) -> int:

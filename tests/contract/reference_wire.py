@@ -86,7 +86,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(data: bytes) -> bytes | None:
-    """Undo `cobs_encode`; None if that is impossible."""
+    """Return the decoded bytes; None if they are no COBS."""
     parts, at = [], 0
     while at < len(data):
         part = data[at + 1 : at + data[at]]
@@ -109,7 +109,7 @@ class Line:
         self._line = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Frame | None]:
-        """Take bytes from the other side."""
+        """Yield the frames in received bytes; None for a corrupt one."""
         for byte in data:
             if byte != self.end:
                 self._line += bytes([byte])[: self.longest + 1 - len(self._line)]
@@ -198,11 +198,11 @@ class Outbox:
         self._newest[number] = content
 
     def answer(self, number: int, content: bytes) -> None:
-        """Wait behind the others."""
+        """Append an answer to the queue."""
         self.answers = [*self.answers, (number, content)][:16]
 
     def take(self) -> list[tuple[int, bytes]]:
-        """Empty it."""
+        """Return the queued frames and clear the queue."""
         out = sorted(self._newest.items()) + self.answers
         self.answers, self._newest = [], {}
         return out
@@ -225,15 +225,15 @@ class Parameters:
         }
 
     def restore(self) -> None:
-        """Forget what a host changed."""
+        """Restore the parameters that a host changed."""
         self.now.update(self._built)
 
     def told(self, id_: int, result: int) -> bytes:
-        """Return what PARAMETER_VALUE says now."""
+        """Return the content of PARAMETER_VALUE."""
         return struct.pack("<BiB", id_, self.now.get(id_, 0), result)
 
     def change(self, id_: int, value: int, *, idle: bool, owner: bool) -> int:
-        """Carry PARAMETER_SET out, or not; return the result."""
+        """Execute PARAMETER_SET if it is allowed; return the result code."""
         lowest = {WATCHDOG: 5, EDGE_STAMPS: 0, TRAVEL_ORIGIN: -1}.get(id_, 1)
         reasons = (
             (UNKNOWN, id_ not in self.now),

@@ -40,7 +40,7 @@ _RIG = ("backend.kind=sim-board", "reference.soft_start_s=0.5")
 
 
 class Verdict(NamedTuple):
-    """What became of one run."""
+    """Result of one run."""
 
     outcome: str
     right: bool  # the outcome is one of the row's
@@ -51,7 +51,7 @@ class Verdict(NamedTuple):
 
 
 class Bench(NamedTuple):
-    """A run before it begins."""
+    """Rig, plan, board and oracle of a run before its start."""
 
     rig: Rig
     length: float  # s, device time

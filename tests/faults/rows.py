@@ -34,7 +34,7 @@ class Row(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What the table calls it."""
+        """Name of the row in the table."""
         return " ".join((self.fault, *self.overrides))
 
 

@@ -59,7 +59,7 @@ def mixed(seed: int) -> tuple[str, list[str], list[str]]:
 
 
 def is_known(outcome: str) -> bool:
-    """Whether a run may end like that."""
+    """Return whether a run may end with this outcome."""
     kind = getattr(errors, outcome, None)
     return outcome in ON_PURPOSE | REASONS or (kind is not None and issubclass(kind, errors.DcmpError))
 

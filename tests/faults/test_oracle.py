@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("untraced")
 
 
 class TakesOldCommands(Board):
-    """Thinks that every command is fresh."""
+    """A board that accepts commands of any age."""
 
     def receive(self, data: bytes) -> None:
         frame = next(iter(cobs.Receiver().feed(data)), None)

@@ -40,7 +40,7 @@ Fields = dict[str, Any]
 
 @functools.cache
 def database() -> Database:
-    """Return the DBC file as cantools reads it."""
+    """Return the DBC file as a cantools database."""
     read = cantools.database.load_file(DBC)
     assert isinstance(read, Database)
     return read
@@ -89,7 +89,7 @@ def unstuff(data: bytes) -> bytes:
 
 
 class Core:
-    """The library."""
+    """The firmware core, loaded as a library."""
 
     def __init__(self, ffi: FFI, lib: Any) -> None:
         self.ffi = ffi
@@ -130,7 +130,7 @@ class Bench:
 
     @property
     def state(self) -> int:
-        """Return what the device's state is."""
+        """Return the device's state."""
         return int(self.device.supervisor.state)
 
     @property
@@ -143,12 +143,12 @@ class Bench:
         self.now = (self.now + microseconds) & 0xFFFFFFFF
 
     def output(self) -> tuple[int, bool]:
-        """Return what the amplifier has to do."""
+        """Return the voltage, mV, and ENABLE of the amplifier."""
         out = self.lib.dcmp_device_output(self.device, self.now)
         return out.voltage_mV, out.enable
 
     def tick(self, times: int = 1, edge: Any = None) -> tuple[int, bool]:
-        """Pass periods; take what was sent in them."""
+        """Run ticks; clear the frames that were sent; return voltage and ENABLE."""
         out = None
         for _ in range(times):
             self.advance(self.config.period_us)
@@ -159,7 +159,7 @@ class Bench:
         return out.voltage_mV, out.enable
 
     def take(self) -> list[tuple[str, Fields]]:
-        """Return the frames that wait to be sent."""
+        """Return the frames that wait to be sent, decoded."""
         frame = self.core.new("struct dcmp_frame *")
         taken = []
         while self.lib.dcmp_device_transmit(self.device, frame):
@@ -190,7 +190,7 @@ class Bench:
         return self.ask("HELLO", session=session, protocol_hash=self.lib.check_protocol_hash() ^ wrong)
 
     def drive(self, voltage: int = 0, *, age: int = 0, **fields: int) -> bool:
-        """Send a DRIVE; say whether it was accepted."""
+        """Send a DRIVE; return whether it was accepted."""
         filled = {"seq": (self.device.tick - age) % 8192, "arm": 1, "clear": 0, "release": 0}
         filled |= {"session": SESSION, "ttl_ms": 50} | fields
         before, self.device.driven = self.device.driven, False
@@ -214,7 +214,7 @@ class Bench:
         assert self.tick() == (voltage, True)
 
     def corrupt(self, times: int = 1) -> None:
-        """Damage frames."""
+        """Send corrupt frames."""
         for _ in range(times):
             self.lib.dcmp_device_corrupt(self.device, self.now)
 

@@ -82,7 +82,7 @@ def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
 
 
 def build(folder: Path, kind: str) -> Path:
-    """Build the library of one kind."""
+    """Build the library of one kind; return its path."""
     objects = compile_all(folder, BUILDS[kind], HERE / "core_checks.c")
     library = folder / f"libcore_{kind}.so"
     subprocess.run(

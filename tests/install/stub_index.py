@@ -28,7 +28,7 @@ class Pin(NamedTuple):
 
     @property
     def version(self) -> str:
-        """The version that the lock names."""
+        """Version that the lock names."""
         (specifier,) = self.requirement.specifier
         return specifier.version
 

@@ -48,7 +48,7 @@ def recorded(path: Path, periods: int = 500) -> list[Block]:
 
 
 def begun(path: Path, periods: int) -> tuple[Recording, list[Block]]:
-    """Write a synthetic run that has not ended."""
+    """Write a synthetic run without its end."""
     rig = bench()
     sink = Recording(path, rig.period, about(rig, "a note", ["wire.drop"]), rig_json(rig))
     made = blocks(periods)

@@ -89,7 +89,7 @@ def lose(truth: Truth, share: float, seed: int = 2) -> tuple[Truth, int]:
 
 
 def write(path: Path, columns: Mapping[str, NDArray[np.float64]], form: str = "%.12g") -> Path:
-    """Write columns as a CSV file."""
+    """Write columns as a CSV file; return its path."""
     table = np.column_stack(list(columns.values()))
     np.savetxt(path, table, fmt=form, delimiter=",", header=",".join(columns), comments="")
     return path

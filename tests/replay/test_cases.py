@@ -24,7 +24,7 @@ needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="the recordings are 
 
 
 class Right(NamedTuple):
-    """What is right of a case."""
+    """True values of a case."""
 
     options: str = "--ku 5.4"
     rms: float = CONTROL

@@ -1,4 +1,4 @@
-"""Positions that wrap."""
+"""Position counters that wrap."""
 
 from __future__ import annotations
 

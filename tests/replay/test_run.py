@@ -153,7 +153,7 @@ class Still:
 
 
 class Runaway(Still):
-    """An observer that explodes."""
+    """An observer whose estimate diverges."""
 
     def update(self, sample: Sample) -> Estimate:
         return Estimate(0.0, float("inf") if sample.t > 0.5 else 0.0, 0.0)

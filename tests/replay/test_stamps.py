@@ -1,4 +1,4 @@
-"""Time as loggers write it."""
+"""Time columns in the formats of loggers."""
 
 from __future__ import annotations
 

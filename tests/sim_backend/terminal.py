@@ -50,7 +50,7 @@ class Terminal:
         self.write(self._encode(pack(message, 0)))
 
     def hear(self, seconds: float = PATIENT_S) -> list[Message | None]:
-        """Return messages, at least one if any comes."""
+        """Return the messages within `seconds`, at least one if any arrives."""
         found: list[Message | None] = []
         while not found and (data := self.read(seconds)):
             found = [unpack(frame, 0) for frame in self.receiver.feed(data)]

@@ -92,7 +92,7 @@ class Bench:
         return open_can(load_rig(RIG, [f"backend.channel={self.name}", self._rate]), MonotonicClock())
 
     def drive(self, *arguments: str) -> Host:
-        """Start a host, and wait until it drives."""
+        """Start a host, wait until it drives, and return it."""
         started = self.start(*SOON, "--duration", "0", *arguments)
         wait(lambda: started.ended or self._is_driven(), "the host drives")
         assert not started.ended, started.printed()
@@ -114,7 +114,7 @@ class Bench:
 
 
 def drive(backend: DeviceBackend, periods: int) -> None:
-    """Drive for so long."""
+    """Drive for `periods` cycles."""
     for _ in range(periods):
         backend.read()
         backend.write(DRIVE_V)

@@ -36,7 +36,7 @@ _reports: dict[str, list[dict[str, Any]]] = {}
 
 
 class Outcome(NamedTuple):
-    """What became of the machine."""
+    """Result of the machine's run."""
 
     run: str  # of pytest, whose processes share it
     problem: str = ""

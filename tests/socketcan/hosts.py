@@ -31,12 +31,12 @@ class Host:
         theirs.close()
 
     def start(self, *arguments: str) -> None:
-        """Begin."""
+        """Start the process."""
         self._order.send(arguments)
 
     @property
     def ended(self) -> bool:
-        """Whether it did."""
+        """Return whether the process has ended."""
         return not self._process.is_alive()
 
     def wait(self) -> int | None:
@@ -45,7 +45,7 @@ class Host:
         return self._process.exitcode
 
     def printed(self) -> str:
-        """Return what it printed, on one line."""
+        """Return the output of the process on one line."""
         return " ".join(self._printed.read_text().split())
 
     def close(self) -> None:

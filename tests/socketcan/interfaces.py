@@ -28,7 +28,7 @@ _CHUNK = 4096
 
 
 def ip(*words: str) -> None:
-    """Say `ip link ...`, as a user would."""
+    """Run `ip link ...`, as a user does."""
     subprocess.run(["ip", "link", *words], check=True)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class State(IntEnum):
-    """As in SAMPLE."""
+    """States of the device, numbered as in SAMPLE."""
 
     BOOT = 0
     IDLE = 1
@@ -39,7 +39,7 @@ NEXT: Table = {  # from BOOT, IDLE, ARMING, RUN, FAULT
 
 
 class Command(NamedTuple):
-    """A DRIVE."""
+    """Content of a DRIVE."""
 
     session: int
     age: int = 0  # periods since the SAMPLE that it answers
@@ -62,7 +62,7 @@ class Device(NamedTuple):
 
 
 class Rules:
-    """What a device does.
+    """Transitions of the device model.
 
     Parameters
     ----------
@@ -124,11 +124,11 @@ class Rules:
         return self.event(self.guard(device), CORRUPTION)
 
     def stop(self, device: Device) -> Device:
-        """Hear STOP."""
+        """Return the device after a STOP."""
         return self.event(self.guard(device), STOP)
 
     def hello(self, device: Device, session: int) -> Device:
-        """Hear HELLO."""
+        """Return the device after a HELLO."""
         device = self.guard(device)
         if device.owner:
             return device
@@ -139,7 +139,7 @@ class Rules:
         return device if device.state in (A, R) else device._replace(owner=0, last=self.far)
 
     def accepts(self, device: Device, command: Command) -> bool:
-        """Whether a command is one."""
+        """Return whether the device accepts a command."""
         mine = command.session == device.owner != 0
         return device.state != B and mine and command.age <= self.oldest and command.age < device.last
 
@@ -160,7 +160,7 @@ class Rules:
         return device._replace(owner=0, last=self.far) if command.flag == "release" else device
 
     def classify(self, device: Device, command: Command, *, close: bool) -> str:
-        """Return what a command means to the table."""
+        """Return the event of the table that a command is."""
         if command.flag == "release":
             return RELEASE
         if command.flag == "clear" and not command.volts and device.lowered:

@@ -32,7 +32,7 @@ class Objector:
 
 
 class Host:
-    """A run that has just been armed."""
+    """A host whose device has just been armed."""
 
     def __init__(self, backend: DeviceBackend, judge: Judge, session: int) -> None:
         self.backend, self.judge, self.session = backend, judge, session
@@ -54,7 +54,7 @@ class Host:
         return self.supervisor.phase is Phase.RUNNING
 
     def period(self, demand: float) -> None:
-        """Do what dcmp_hil.loop does in a period."""
+        """Run one cycle as `dcmp_hil.loop` does."""
         sample = self.backend.read()
         if not sample.t > self.sample.t:
             self.judge.note(f"time goes from {self.sample.t} s to {sample.t} s")

@@ -45,7 +45,7 @@ class Judge(Oracle):
         self._ticked()
 
     def was_reset(self) -> None:
-        """Forget what the board has forgotten as well."""
+        """Reset the judge's state after a reset of the board."""
         self._ears.feed(b"\0")
         self._drives, self._good = [], []
         self._state, self._voltage, self._tick = int(State.BOOT), 0, -1

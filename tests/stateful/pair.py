@@ -58,11 +58,11 @@ class Model:
         self.rules, self.table, self._deaf = rules, table, deaf
 
     def start(self) -> Pair:
-        """Return the pair as it is switched on."""
+        """Return the pair after power-on."""
         return Pair(self.rules.boot())
 
     def following(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
-        """Return what may happen, with its name."""
+        """Yield every possible event and the pair after it."""
         yield from self._time(pair)
         yield from self._line(pair)
         yield from self._host(pair)

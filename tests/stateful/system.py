@@ -104,7 +104,7 @@ class System:
 
     @property
     def violations(self) -> list[str]:
-        """What was found."""
+        """Violations that were found so far."""
         return self.judge.violations
 
     @property
@@ -162,7 +162,7 @@ class System:
         self._link.elapse(ticks)
 
     def inject_fault(self, kind: str, ticks: int) -> None:
-        """Switch a fault on for so long."""
+        """Activate a fault for `ticks` ticks."""
         effect = self._effects[kind]
         self._ends[kind] = self.board.tick_count + ticks
         if not effect.on:

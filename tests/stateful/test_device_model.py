@@ -28,7 +28,7 @@ COMMANDS = [Command(*fields) for fields in product(SESSIONS, (0, 1, 3, 4), (Fals
 
 
 class Twin:
-    """The firmware, as it can be copied."""
+    """The firmware, with a state that can be copied."""
 
     def __init__(self, core: Core, device: Any = None, now: int = 0, counts: int = 0) -> None:
         self.core, self.lib, self.now, self.counts = core, core.lib, now, counts
@@ -66,7 +66,7 @@ class Twin:
             encoder.past[i] = encoder.position
 
     def seen(self) -> tuple[object, ...]:
-        """Return what the model has as well."""
+        """Return the state that the model has as well."""
         device = self.device
         out = self.lib.dcmp_device_output(device, self.now)
         supervisor = device.supervisor

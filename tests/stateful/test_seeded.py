@@ -98,7 +98,7 @@ IN_FIRMWARE = {
 
 
 def found() -> str:
-    """Return what the machine finds."""
+    """Return the violations that the machine finds."""
     with pytest.raises(AssertionError) as caught:
         run_state_machine_as_test(Machine, settings=budget(EXAMPLES, LENGTH))
     return str(caught.value)

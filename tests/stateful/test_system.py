@@ -1,4 +1,4 @@
-"""What the machine found once."""
+"""Failures that the stateful machine found, as single tests."""
 
 import pytest
 

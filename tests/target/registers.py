@@ -42,14 +42,14 @@ NO_FIELD = {
 
 
 class Field(NamedTuple):
-    """Some bits of a register."""
+    """A bit field of a register."""
 
     position: int
     width: int
 
 
 class Header(NamedTuple):
-    """What regs.h says."""
+    """Registers and constants of regs.h."""
 
     structs: dict[str, dict[str, int]]  # every word's offset, by its path: "T[1].IR"
     peripherals: dict[str, tuple[str, int]]  # structure and address

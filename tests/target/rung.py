@@ -36,14 +36,14 @@ CONFIG = {
 
 
 class Rung:
-    """A board that a host drives."""
+    """A board with a host that drives it."""
 
     def __init__(self, board: TargetBoard, host: SimBoardBackend) -> None:
         self.board, self.system, self.host = board, board.system, host
         self.k = 0
 
     def drive(self, periods: int, volts: Callable[[int, Sample], float] = lambda *_: 1.0) -> list[Sample]:
-        """Answer so many samples."""
+        """Answer `periods` samples with DRIVEs; return the samples."""
         seen = []
         for _ in range(periods):
             sample = self.host.read()
@@ -85,7 +85,7 @@ def rung(
 
 
 def sine(k: int, sample: Sample) -> float:
-    """Return volts that a motor likes."""
+    """Return a sinusoidal voltage for sample `k`, V."""
     return 6.0 * math.sin(0.02 * k) - 20.0 * sample.position
 
 

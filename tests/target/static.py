@@ -70,7 +70,7 @@ PROGRAMS = {
 
 
 class Finding(NamedTuple):
-    """What a tool says of a line."""
+    """A finding of a tool for one line."""
 
     rule: str  # "15.5" of MISRA, or cppcheck's own word
     file: str  # from firmware/
@@ -141,7 +141,7 @@ def _included(file: Path, folders: tuple[str, ...]) -> frozenset[str]:
 
 
 def headers(program: Program) -> set[str]:
-    """Return the headers that a program sees."""
+    """Return the headers that a program includes."""
     folders = tuple(
         after for before, after in zip(program.options, program.options[1:], strict=False) if before == "-I"
     )
@@ -196,7 +196,7 @@ def judge(found: Iterable[Finding], rows: list[Deviation], version: str = "2.10"
 
 
 def analyze(program: Program, file: Path, out: Path) -> str:
-    """Return what gcc's analyzer says of a file."""
+    """Return the output of gcc's analyzer for a file."""
     mine = (
         [needed("arm-none-eabi-gcc"), "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft", "-ffreestanding"]
         if program.for_chip

@@ -28,7 +28,7 @@ _PATIENT_MS = 10_000
 
 @pytest.fixture(scope="module")
 def qemu(f405: Path) -> Sequence[str]:
-    """Return what starts the board in the emulator."""
+    """Return the command that starts the board in the emulator."""
     needed("qemu-system-arm")
     return [sys.executable, "-m", "tools.qemu_device", "--elf", str(f405 / "qemu_f405.elf")]
 

@@ -76,7 +76,7 @@ def cycle(k: int) -> Cycle:
 
 
 def truth(k: int) -> Truth:
-    """Return what the simulation would know."""
+    """Return the true state at cycle `k`."""
     return Truth(math.sin(k * T), math.cos(k * T), 2.5)
 
 

@@ -39,7 +39,7 @@ class Notes:
         self._write(f"event {event.text}")
 
     def close(self) -> None:
-        """Note that too."""
+        """Write a note about the close."""
         self._write("closed")
 
     def _write(self, line: str) -> None:
@@ -69,7 +69,7 @@ class Strikes:
         self.struck = False
 
     def block(self, block: Block) -> None:
-        """Strike."""
+        """Raise an exception."""
         if not self.struck and block["t"][-1] >= self._at:
             self.struck = True
             self._act()
@@ -101,6 +101,6 @@ def noted(file: Path, what: str) -> list[str]:
 
 
 def fill(apart: Apart, periods: int, first: int = 0) -> None:
-    """Write periods as the loop does."""
+    """Record cycles as the loop does."""
     for k in range(first, first + periods):
         apart.ring.push(cycle(k * T), UNKNOWN_TRUTH, HELD)

@@ -190,7 +190,7 @@ class Busy(Notes):
     """A sink that holds the interpreter lock of its process for longer than an idle one is waited for."""
 
     def __init__(self) -> None:
-        """Note nothing."""
+        """Accept no notes."""
 
     def block(self, block: Block) -> None:  # noqa: ARG002
         """Make every other thread wait, as on a slow computer: C code keeps the interpreter lock."""

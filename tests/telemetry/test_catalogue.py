@@ -44,7 +44,7 @@ class Host:
         )  # fmt: skip
 
     def telemetry(self) -> int:
-        """Return the telemetry process, once it records."""
+        """Return the id of the telemetry process, once it records."""
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
 
         def found() -> list[int]:

@@ -55,7 +55,7 @@ class OpenWindow:
     """A window that is not closed."""
 
     def poll(self) -> None:
-        """Return nothing: it is still open."""
+        """Return None: the window is still open."""
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[RerunSink]:
 
 
 def coloured(picture: Path, colour: tuple[int, int, int]) -> int:
-    """Count the pixels of about that colour."""
+    """Return the number of pixels of about this colour."""
     from PIL import Image
 
     with Image.open(picture) as image:

@@ -1,4 +1,4 @@
-"""Columns written as a recording."""
+"""Columns, written as a Rerun recording."""
 
 from __future__ import annotations
 

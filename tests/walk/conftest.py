@@ -1,4 +1,4 @@
-"""One world a worker."""
+"""One shared environment for each worker."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def world(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
-    """Yield what commands need around them."""
+    """Yield the files, ports and runs that the commands need."""
     with tempfile.TemporaryDirectory(prefix="dcmp", dir="/tmp") as runtime:  # a socket's path is short
         made = World(installed, tmp_path_factory.mktemp("world"), Path(runtime))
         with made.stack:

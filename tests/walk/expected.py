@@ -43,7 +43,7 @@ _REFUSED = 2
 
 
 def check(command: str, chosen: Mapping[str, tuple[str, ...]], called: Called, folder: Path) -> None:
-    """Compare a call with what is documented.
+    """Compare the result of a call with the documentation.
 
     Raises
     ------

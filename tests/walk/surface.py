@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Option:
-    """One option or argument of a command.
+    """Name, type and values of one option or argument.
 
     Parameters
     ----------

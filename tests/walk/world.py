@@ -82,7 +82,7 @@ class World:
 
     @cached_property
     def pid(self) -> int:
-        """A run that goes on and listens."""
+        """Return the process id of a run that accepts clients."""
         return self.stack.enter_context(self.run())
 
     @cached_property
@@ -96,7 +96,7 @@ class World:
 
     @property
     def port(self) -> int:
-        """A port of 127.0.0.1 that is free."""
+        """Return a free port of 127.0.0.1."""
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""Counters that wrap."""
+"""Wrapping counters of the protocol."""
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

@@ -27,7 +27,7 @@ ANSWERS = (b"", b"z", b"Z", b"V0101", b"NDCMP", b"F00", b"\x07", b"\x07\x07z", b
 
 
 class Carrier(NamedTuple):
-    """One of the two on a serial line."""
+    """One of the two carriers of a serial line."""
 
     module: Any
     wire: Callable[[int, bytes], bytes]  # as others write it

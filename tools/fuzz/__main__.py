@@ -37,7 +37,7 @@ def _asked() -> argparse.Namespace:
 
 
 def figures(found: Campaign) -> str:
-    """Return the counts of a campaign as lines."""
+    """Return the counts of a campaign as text."""
     total = found.total
     each = max(1, total.executions)
     return (
@@ -52,7 +52,7 @@ def figures(found: Campaign) -> str:
 
 
 def complaints(found: Campaign, executions: int, reached: Reach | None) -> list[str]:
-    """Return what is wrong with a campaign."""
+    """Return the requirements that a campaign violates."""
     wrong = [
         f"found: {each.wrong}\n  the input: {_kept(each.input)}" for each in found.outcomes if each.wrong
     ]

@@ -43,7 +43,7 @@ def _reports(folder: Path) -> list[dict[str, object]]:
 
 
 def reach(folder: Path, inputs: Sequence[Path]) -> Reach:
-    """Replay inputs in a build that counts.
+    """Replay inputs in a build with coverage; return the branches reached.
 
     Raises
     ------

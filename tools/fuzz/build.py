@@ -33,7 +33,7 @@ class Edit:
     wrong: str
 
     def made(self) -> str:
-        """Return the file with the error in it.
+        """Return the text of the file with the error.
 
         Raises
         ------
@@ -71,7 +71,7 @@ def core_files() -> list[Path]:
 
 
 def target_files() -> list[Path]:
-    """Return those of the target and its model."""
+    """Return the source files of the target and its model."""
     return sorted(path for path in TARGET.glob("*.c") if path.name != "replay.c")
 
 

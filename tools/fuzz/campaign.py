@@ -22,7 +22,7 @@ _STATISTICS = re.compile(
 
 
 class Counts(NamedTuple):
-    """What the target counted."""
+    """Counters of the fuzz target."""
 
     executions: int
     ticks: int
@@ -32,7 +32,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one process found.
+    """Findings of one process.
 
     `wrong` is what the model, the invariants or a sanitizer said, "" for nothing; `executions` is how many it
     took, the one that found it included.
@@ -46,7 +46,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What all of them found together."""
+    """Findings of all processes together."""
 
     outcomes: tuple[Outcome, ...]
     wall_s: float

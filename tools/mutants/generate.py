@@ -70,7 +70,7 @@ class Mutant:
 
 
 def text_of(node: Node) -> str:
-    """Return what a piece of the source reads."""
+    """Return the source text of a node."""
     return (node.text or b"").decode()
 
 

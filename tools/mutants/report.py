@@ -39,7 +39,7 @@ def names(path: Path) -> dict[Key, str]:
 
 
 def says(mutant: Mutant) -> str:
-    """Return a mutant as `mutants.toml` would name it."""
+    """Return the name of a mutant as in `mutants.toml`."""
     number = f"number = {mutant.number}\n" if mutant.number > 1 else ""
     fields = (
         ("file", mutant.file),

@@ -17,7 +17,7 @@ from tools.soak.real import real
 
 
 def main() -> None:
-    """Soak, print, and say what must not be."""
+    """Run the soak, print its figures, and report violations."""
     parser = argparse.ArgumentParser(prog="python -m tools.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=480.0, help="of simulated time")
     parser.add_argument("--speed", type=float, default=200.0, help="times real time, at most")

@@ -15,13 +15,13 @@ SETTLING = 5.0
 
 @dataclass(slots=True)
 class Growth:
-    """Memory of one thing, MB, by simulated minute."""
+    """Memory of one process, MB, by simulated minute."""
 
     minutes: list[float] = field(default_factory=list)
     mb: list[float] = field(default_factory=list)
 
     def add(self, minute: float, mb: float) -> None:
-        """Take what it is now."""
+        """Add the present memory."""
         self.minutes.append(minute)
         self.mb.append(mb)
 
@@ -49,7 +49,7 @@ class Growth:
 
 
 class Memory:
-    """What several processes take, by simulated minute.
+    """Memory of several processes, by simulated minute.
 
     What counts as growth is what a process has for itself: its anonymous pages, in memory or swapped out. The
     files in memory that the processes share (ring, ledger, logs) count once, apart from them. Pages of
@@ -70,7 +70,7 @@ class Memory:
         self.peak_mb = 0.0
 
     def look(self, minute: float, processes: dict[str, int], sharing: int) -> None:
-        """Look at all of them.
+        """Measure the memory of all processes.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ def cpu_s(pid: int) -> float:
 
 
 def _smaps(pid: int) -> dict[str, float]:
-    """Return what the kernel counts, MB."""
+    """Return the memory figures of the kernel, MB."""
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text("ascii").splitlines()[1:]
     return {name: 1e-3 * float(rest.split()[0]) for name, _, rest in (line.partition(":") for line in lines)}
 

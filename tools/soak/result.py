@@ -16,7 +16,7 @@ SLOPE_MB, TOTAL_MB = 0.2, 500.0
 
 @dataclass(slots=True)
 class Soaked:
-    """What a soak came to.
+    """Result of a soak.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Soaked:
     troubles: list[str]
 
     def faults(self) -> list[str]:
-        """Return what must not be."""
+        """Return the requirements that the soak violates."""
         found = [
             f"{name}: grows by {growth.slope():.3f} MB a simulated minute"
             for name, growth in self.memory.growth.items()
@@ -61,7 +61,7 @@ class Soaked:
         return found + self.troubles
 
     def document(self) -> dict[str, object]:
-        """Return all of it for a JSON document."""
+        """Return the result as a document for JSON."""
         figures = {name: value for name, value in asdict(self).items() if name != "memory"}
         growth = self.memory.growth.items()
         return {

@@ -114,7 +114,7 @@ def _wrong_answer(code: int | None, said: str, way: str) -> Iterator[str]:
 
 
 def _left(host: HostileRun, kind: str) -> Iterator[str]:
-    """Look at what is left: processes, sockets, files."""
+    """Yield what a run left: processes, sockets, files."""
     try:
         wait(lambda: _summary(host.folder) and host.pid not in running(), "its files", within_s=15.0)
     except TimeoutError as error:
@@ -139,7 +139,7 @@ def _summary(folder: Path) -> dict[str, Any]:
 
 
 def _recording(folder: Path) -> object:
-    """Return the run's recording, if it is whole."""
+    """Return the run's recording if it is complete."""
     for path in folder.glob("runs/*/run.mcap"):
         with suppress(ConfigError):
             found = read_run(path)

@@ -28,7 +28,7 @@ REQUIRED = ("HandlersSet", "SignalsIgnored", "Swallows", "Forks", "BlocksInC", "
 
 
 class Bar(NamedTuple):
-    """What one STOP came to."""
+    """Result of one STOP."""
 
     kind: str
     way: str

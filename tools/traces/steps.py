@@ -24,16 +24,16 @@ A `line` has no `sent`."""
 
 
 class Device(Protocol):
-    """A device as a trace sees it."""
+    """Protocol of a device in a trace."""
 
     @property
     def state(self) -> int:
-        """State, as in SAMPLE."""
+        """State of the device, as in SAMPLE."""
         ...
 
     @property
     def applied_mV(self) -> int:
-        """What the amplifier puts out now."""
+        """Output voltage of the amplifier, mV."""
         ...
 
     @property
@@ -46,7 +46,7 @@ class Device(Protocol):
         ...
 
     def transmit_frames(self) -> list[Frame]:
-        """Return what was sent since."""
+        """Return the frames that were sent since the last call."""
         ...
 
     def tick(self, counts: int, /) -> None:
@@ -58,12 +58,12 @@ class Device(Protocol):
         ...
 
     def link(self, up: bool, /) -> None:
-        """Hang the line up, or put it back."""
+        """Set the link up or down."""
         ...
 
 
 def shown(frame: Frame) -> str:
-    """Write a frame as `identifier#payload`, in hex."""
+    """Return a frame as `identifier#payload`, in hex."""
     number, data = frame
     return f"{number:03X}#{data.hex().upper()}"
 
@@ -162,7 +162,7 @@ class Recorder:
         self._play({"wait_us": us})
 
     def line(self, *, up: bool) -> None:
-        """Hang the line up, or put it back."""
+        """Set the link up or down."""
         self._play({"line": "up" if up else "down"})
 
     def arm(self) -> None:

@@ -1,4 +1,4 @@
-"""Debian's kernel and busybox, unpacked and not installed."""
+"""Debian's kernel and busybox, unpacked without installation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class UnavailableError(RuntimeError):
 
 
 class Unpacked(NamedTuple):
-    """What a machine is made of."""
+    """Files of a machine: kernel, busybox and modules."""
 
     kernel: bytes
     modules: dict[str, Path]  # by name, with underscores

@@ -34,7 +34,7 @@ _KERNEL = "console=ttyS0 quiet panic=-1 mitigations=off audit=0 random.trust_cpu
 
 
 class Machine(NamedTuple):
-    """What QEMU starts."""
+    """A virtual machine under QEMU."""
 
     kernel: Path
     initramfs: Path

@@ -17,7 +17,7 @@ class Bang:
         self._periods = 0
 
     def update(self, reference: Reference, estimate: Estimate) -> float:  # noqa: ARG002
-        """Return one of the two by turns."""
+        """Return the two voltages in turn, V."""
         self._periods += 1
         return self._volts if self._periods // self._every % 2 else -self._volts
 

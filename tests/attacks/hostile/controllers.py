@@ -26,13 +26,13 @@ class Good:
         self.begin()
 
     def begin(self) -> None:
-        """Do what is bad from the beginning."""
+        """Misbehave at the start of the run."""
 
     def turn(self) -> None:
-        """Do what is bad, once."""
+        """Misbehave once."""
 
     def every(self) -> None:
-        """Do what is bad in every period."""
+        """Misbehave in every cycle."""
 
     def control(self, reference: Reference, estimate: Estimate) -> float:
         error = reference.position - estimate.position
@@ -175,7 +175,7 @@ class RaisesBase(Good):
 
 
 class Threads(Good):
-    """Starts threads that are no daemons."""
+    """Starts threads that are not daemons."""
 
     def begin(self) -> None:
         threading.Thread(target=time.sleep, args=(30.0,)).start()

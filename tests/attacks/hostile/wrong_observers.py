@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 
 class Right:
-    """What the others spoil."""
+    """The rig's own observer, which the other classes change."""
 
     def __init__(self, context: ObserverContext) -> None:
         self._observer = SuperTwisting(context)
 
     def update(self, sample: Sample) -> Estimate:
-        """Return what the rig's own observer finds."""
+        """Return the estimate of the rig's own observer."""
         return self._observer.update(sample)
 
 
 class Zero(Right):
-    """Answers 0."""
+    """Returns an estimate of zeros."""
 
     def update(self, sample: Sample) -> Estimate:
         """Return zeros."""
@@ -35,7 +35,7 @@ class Zero(Right):
 
 
 class WrongSign(Right):
-    """The arm goes the other way."""
+    """Returns the estimate with the wrong sign."""
 
     def update(self, sample: Sample) -> Estimate:
         """Return everything negated."""
@@ -43,7 +43,7 @@ class WrongSign(Right):
 
 
 class Frozen(Right):
-    """Goes on saying what it said first."""
+    """Returns its first estimate for ever."""
 
     _said: Estimate | None = None
 
@@ -76,7 +76,7 @@ class Garbage(Right):
 
 
 class Delayed(Right):
-    """What was true 100 samples ago."""
+    """Returns the estimate of 100 samples ago."""
 
     def __init__(self, context: ObserverContext) -> None:
         super().__init__(context)

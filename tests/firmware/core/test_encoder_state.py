@@ -1,4 +1,4 @@
-"""What the encoder remembers, number by number."""
+"""The encoder's state, variable by variable."""
 
 import pytest
 

@@ -15,7 +15,7 @@ BLANK = b"\xff" * RECORD_BYTES
 
 
 class Store:
-    """Two sectors as the firmware sees them."""
+    """Two flash sectors, as the firmware sees them."""
 
     def __init__(self, core: Core, *sectors: list[bytes]) -> None:
         self.core = core

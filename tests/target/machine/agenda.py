@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Agenda:
-    """What will happen."""
+    """Queue of future calls, in the order of time."""
 
     def __init__(self) -> None:
         self.next_us = math.inf
@@ -25,7 +25,7 @@ class Agenda:
         self.next_us = self._deeds[0][0]
 
     def take(self) -> Callable[[], object]:
-        """Return what is next, and forget it."""
+        """Remove the next call from the queue, and return it."""
         deed = heapq.heappop(self._deeds)[2]
         self.next_us = self._deeds[0][0] if self._deeds else math.inf
         return deed

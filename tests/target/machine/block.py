@@ -34,13 +34,13 @@ class Block:
         self.now = {register.name: register.reset for register in self.registers.values()}
 
     def misuse(self, what: str) -> None:
-        """Note what no program may do."""
+        """Record an access that no program may make."""
         self.system.misuse.append(
             f"{self.name}: {what}, at {self.system.now_us:.1f} us, pc {self.system.pc():#x}"
         )
 
     def is_clocked(self) -> bool:
-        """Whether RCC lets it work."""
+        """Return whether RCC supplies the block's clock."""
         if self.CLOCK is None:
             return True
         register, bit = self.CLOCK
@@ -88,15 +88,15 @@ class Block:
         return bool(self.now[register] >> bit & 1)
 
     def field(self, register: str, at: int, width: int) -> int:
-        """Return some bits."""
+        """Return a field of a register."""
         return self.now[register] >> at & ((1 << width) - 1)
 
     def raise_flag(self, register: str, *bits: int) -> None:
-        """Set bits."""
+        """Set flags of a register."""
         for bit in bits:
             self.now[register] |= 1 << bit
 
     def drop_flag(self, register: str, *bits: int) -> None:
-        """Clear bits."""
+        """Clear flags of a register."""
         for bit in bits:
             self.now[register] &= ~(1 << bit)

@@ -84,13 +84,13 @@ class TargetBoard:
         self.system.can.hear((number, data))
 
     def transmit(self) -> bytes:
-        """Return the bytes that went out."""
+        """Return the bytes that the board has sent."""
         sent = bytes(self.system.usart.sent)
         self.system.usart.sent.clear()
         return sent
 
     def transmit_frames(self) -> list[Frame]:
-        """Return the frames that went out."""
+        """Return the frames that the board has sent."""
         sent, self._frames = self._frames, []
         return sent
 

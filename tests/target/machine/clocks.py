@@ -56,7 +56,7 @@ class Rcc(Block):
         return hz
 
     def timer_Hz(self, bus: int) -> float:  # noqa: N802
-        """Return the clock of that bus's timers."""
+        """Return the clock of the timers of `bus`, Hz."""
         divided = self.field("CFGR", 10 if bus == 1 else 13, 3) >= 4
         return self.bus_Hz(bus) * (2 if divided else 1)
 
@@ -76,13 +76,13 @@ class Rcc(Block):
         return (value & ~0x0202_0002) | ready
 
     def write_PLLCFGR(self, value: int, before: int) -> int:  # noqa: N802
-        """Refuse changes while it runs."""
+        """Refuse changes of PLLCFGR while the PLL runs."""
         if self.flag("CR", 24) and value != before:
             self.misuse("PLLCFGR changes while the PLL runs")
         return value
 
     def write_CFGR(self, value: int, before: int) -> int:  # noqa: N802
-        """Switch the clock, if it is there."""
+        """Switch the system clock if the new source is ready."""
         wanted = value & 3
         there = {0: True, 1: self.flag("CR", 17), 2: self.flag("CR", 25)}.get(wanted, False)
         if not there:
@@ -102,7 +102,7 @@ class Rcc(Block):
         return (before & ~0x80 if value >> 23 & 1 else before) & 0xFF
 
     def stop_crystal(self) -> None:
-        """Let the crystal stop, as something that breaks."""
+        """Stop the crystal, as by a defect."""
         self.crystal = False
         on = self.flag("CR", 19)
         self.drop_flag("CR", 17, 16, 24, 25)
@@ -126,7 +126,7 @@ class Flash(Block):
     KEYS = (0x4567_0123, 0xCDEF_89AB)
 
     def reset(self) -> None:
-        """Lock it."""
+        """Lock the flash."""
         super().reset()
         self._keys = 0
         self.erased = self.written = 0
@@ -150,7 +150,7 @@ class Flash(Block):
         return before & ~(value & 0xF3)
 
     def write_CR(self, value: int, before: int) -> int:  # noqa: N802
-        """Erase, lock."""
+        """Erase a sector, or lock the flash."""
         if before >> 31 & 1:
             self.misuse("CR is written while it is locked")
             return before
@@ -194,7 +194,7 @@ class Iwdg(Block):
         return 1e6 / self.system.lsi_hz
 
     def due_us(self) -> float:
-        """Return when it will bite."""
+        """Return the time of the watchdog's next reset, us."""
         if not self.running:
             return float("inf")
         divider = 4 << min(self.now["PR"], 6)
@@ -230,7 +230,7 @@ class Iwdg(Block):
 
 
 class Gpio(Block):
-    """Sixteen pins."""
+    """A GPIO port with sixteen pins."""
 
     def __init__(self, system: System, name: str) -> None:
         self.CLOCK = ("AHB1ENR", ord(name[-1]) - ord("A"))
@@ -265,13 +265,13 @@ class Gpio(Block):
         return 0
 
     def write_ODR(self, value: int, _: int) -> int:  # noqa: N802
-        """Drive."""
+        """Set the output pins."""
         self.now["ODR"] = value
         self.system.look_at_pins()
         return value
 
     def write_MODER(self, value: int, _: int) -> int:  # noqa: N802
-        """Change what a pin is for."""
+        """Change the mode of the pins."""
         self.now["MODER"] = value
         self.system.look_at_pins()
         return value

@@ -30,7 +30,7 @@ class Cpu:
         self.reset()
 
     def reset(self) -> None:
-        """Take no exceptions, and none pending."""
+        """Reset the state of exceptions: none active, none pending."""
         self.enabled: set[int] = set()
         self.pending: set[int] = set()
         self.lines: dict[int, Callable[[], bool]] = {}
@@ -50,7 +50,7 @@ class Cpu:
             self.pend(16 + irq)
 
     def pend(self, number: int) -> None:
-        """Note an exception that is to come."""
+        """Mark an exception as pending."""
         self.pending.add(number)
         self.system.interrupt_now()
 
@@ -58,7 +58,7 @@ class Cpu:
         return _FIXED.get(number, self.priority.get(number, 0))
 
     def now_at(self) -> int:
-        """Return the priority that the processor works at."""
+        """Return the current priority of the processor."""
         return min((self._level(number) for number in self.active), default=_IDLE)
 
     def next(self) -> int | None:
@@ -70,7 +70,7 @@ class Cpu:
         return first if self._level(first) < self.now_at() else None
 
     def may_enter(self) -> int | None:
-        """Return the exception that comes now."""
+        """Return the exception to enter now; None if there is none."""
         first = self.next()
         if first is None or (first > HARD_FAULT and self.uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1):
             return None
@@ -106,7 +106,7 @@ class Cpu:
         self.system.jump(vector)
 
     def leave(self) -> None:
-        """Go back to what was interrupted."""
+        """Return from the exception."""
         uc = self.uc
         stack = uc.reg_read(arm.UC_ARM_REG_SP)
         frame = bytes(uc.mem_read(stack, 32))

@@ -1,4 +1,4 @@
-"""Flash and RAM, and what is in them."""
+"""Flash and RAM, and their contents."""
 
 from __future__ import annotations
 

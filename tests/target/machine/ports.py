@@ -27,7 +27,7 @@ class Usart(Block):
         super().__init__(system)
 
     def reset(self) -> None:
-        """Fall silent."""
+        """Clear the receiver and the transmitter."""
         super().reset()
         self.now["SR"] = 0xC0
         self._coming: deque[int] = deque()
@@ -43,7 +43,7 @@ class Usart(Block):
         return abs(self._byte_us() * self.baud / 10e6 - 1) < 0.02
 
     def hear(self, data: bytes) -> None:
-        """Let bytes come in, one behind the other."""
+        """Receive bytes, one after the other."""
         self._coming.extend(data)
         if not self._receiving and self._coming:
             self._receiving = True
@@ -74,7 +74,7 @@ class Usart(Block):
             self.system.cpu.line(self.IRQ, self.is_pending)
 
     def read_DR(self) -> int:  # noqa: N802
-        """Take the byte; errors go with it."""
+        """Return the received byte, and clear the error flags."""
         self.drop_flag("SR", 0, 1, 2, 3, 5)
         return self._data
 
@@ -102,7 +102,7 @@ class Usart(Block):
 
 
 class Dac(Block):
-    """Channel 1."""
+    """Channel 1 of the DAC."""
 
     NAME = "DAC"
     CLOCK: tuple[str, int] | None = ("APB1ENR", 29)
@@ -113,13 +113,13 @@ class Dac(Block):
         return self.now["DHR12R1"] if on else None
 
     def write_DHR12R1(self, value: int, _: int) -> int:  # noqa: N802
-        """Convert."""
+        """Convert the value to a voltage."""
         self.now["DHR12R1"] = value
         self.system.look_at_pins()
         return value
 
     def write_CR(self, value: int, _: int) -> int:  # noqa: N802
-        """Switch on."""
+        """Switch the block on."""
         self.now["CR"] = value
         if value & 1 and self.system.gpio["A"].mode(4) != 3:
             self.misuse("it is switched on while PA4 is not analog")
@@ -139,7 +139,7 @@ class Can(Block):
         super().__init__(system)
 
     def reset(self) -> None:
-        """Sleep."""
+        """Put the block into sleep mode."""
         super().reset()
         self._fifo: deque[Frame] = deque()
         self._queue: list[int] = []

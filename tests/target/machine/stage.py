@@ -44,5 +44,5 @@ class Stage:
 
     @property
     def amplifier_mV(self) -> float:
-        """What reaches the motor."""
+        """Voltage at the motor, mV."""
         return self.input_mV if self.enable else 0.0

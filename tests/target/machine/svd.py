@@ -17,7 +17,7 @@ _BY_HARDWARE = {"IDR", "SR", "CNT", "CCR1", "CCR2", "CCR3", "CCR4", "CSR", "CIR"
 
 
 class Register(NamedTuple):
-    """One register."""
+    """Address and fields of one register."""
 
     name: str
     reset: int

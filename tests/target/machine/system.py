@@ -151,7 +151,7 @@ class System:
         self.uc.reg_write(arm.UC_ARM_REG_PC, address | 1)
 
     def note_stack(self, at: int) -> None:
-        """Remember how deep it was."""
+        """Record the deepest stack."""
         self.lowest_stack = min(self.lowest_stack, at)
 
     def _spend(self, instructions: int) -> None:
@@ -197,7 +197,7 @@ class System:
                 self._execute()
 
     def run_for(self, us: float) -> None:
-        """Let the board work for so long."""
+        """Run the board for `us` microseconds."""
         self.run_until(self.now_us + us)
 
     def _sleep(self, us: float) -> None:
@@ -274,11 +274,11 @@ class System:
 
     @property
     def amplifier_mV(self) -> float:
-        """What reaches the motor."""
+        """Voltage at the motor, mV."""
         return self.stage.amplifier_mV
 
     def look_at_pins(self) -> None:
-        """Note a change of what reaches the motor."""
+        """Record a change of the voltage at the motor."""
         now = (self.enable, self.amplifier_mV)
         if not self.pins_seen or self.pins_seen[-1][1:] != now:
             self.pins_seen.append((self.now_us, *now))

@@ -17,7 +17,7 @@ TRGO_OF = {("TIM2", 2): "TIM3", ("TIM5", 0): "TIM2", ("TIM2", 0): "TIM1", ("TIM5
 
 
 class Timer(Block):
-    """A timer that counts its clock."""
+    """A timer driven by its clock."""
 
     def __init__(self, system: System, name: str) -> None:
         bits = {"TIM2": 0, "TIM3": 1, "TIM5": 3}
@@ -26,7 +26,7 @@ class Timer(Block):
         super().__init__(system, name)
 
     def reset(self) -> None:
-        """Stand still."""
+        """Stop the timer."""
         super().reset()
         self.now["ARR"] = _WORD if self.name in _WIDE else 0xFFFF
         self._prescaler = 0  # in use; PSC comes in at an update
@@ -34,7 +34,7 @@ class Timer(Block):
         self._round = 0
 
     def period_us(self) -> float:
-        """Return the time of one count."""
+        """Return the time of one count, us."""
         return 1e6 * (self._prescaler + 1) / self.system.rcc.timer_Hz(self.bus)
 
     def count(self) -> int:
@@ -139,7 +139,7 @@ class EncoderTimer(Timer):
         self._world: int | None = None
 
     def count(self) -> int:
-        """Return the count: of edges, not of time."""
+        """Return the count of encoder edges."""
         return self._count & _WORD if self.field("SMCR", 0, 3) else super().count()
 
     def turn(self, to: int) -> None:
@@ -184,7 +184,7 @@ class PwmTimer(Timer):
         return self.flag("BDTR", 12) and level == self.flag("BDTR", 13)
 
     def look_at_break(self) -> None:
-        """Stop the outputs where the pin says so."""
+        """Disable the outputs if the break pin is low."""
         if self._broken():
             self.drop_flag("BDTR", 15)
             self.raise_flag("SR", 7)
