@@ -7,8 +7,13 @@ import os
 import subprocess
 import sys
 import sysconfig
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -63,6 +68,20 @@ def _build(folder: Path) -> None:
 def _check(command: list[str], environment: dict[str, str]) -> None:
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@contextmanager
+def started(script: Path, folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Start the script with arguments in a folder; it is gone in the end."""
+    with subprocess.Popen(
+        [str(script), *arguments], cwd=folder, env=environment(), stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
 
 
 def environment(**changes: str | None) -> dict[str, str]:

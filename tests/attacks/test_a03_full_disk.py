@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import errno
 import json
-import os
 import random
-import shutil
-import subprocess
 import sys
 from functools import partial
 from typing import TYPE_CHECKING
@@ -28,10 +25,11 @@ from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench
-from tests.installed import environment
+from tests.namespaces import on_disk_of
 from tests.telemetry.runs import EVENTS, blocks
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable
     from pathlib import Path
 
@@ -148,26 +146,15 @@ def test_what_a_full_disk_costs_is_told_with_its_time(tmp_path: Path, seed: int)
 
 
 def _on_a_disk(
-    size: str, folder: Path, filler: tuple[str, ...], *command: str
+    size: str, folder: Path, filler: tuple[str, str, str], *command: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command where `runs/` is a file system of that size, which something else fills."""
-    (folder / "runs").mkdir()
+    """Run a command where `runs/` is a file system of that size, which another program fills."""
     (folder / "filler.py").write_text(_FILLER)
-    unshare = shutil.which("unshare")
-    flags = ["--mount"] if os.geteuid() == 0 else ["--map-root-user", "--mount"]
-    if unshare is None or subprocess.run([unshare, *flags, "true"], check=False).returncode:
-        if os.environ.get("CI") == "true":
-            pytest.fail("this test needs a mount namespace: as root, or where users may make them")
-        pytest.skip("this test needs a mount namespace: as root, or where users may make them")
-    kept = (
-        'mount -t tmpfs -o size="$0" none runs && { "$1" filler.py "$2" "$3" "$4" & filler=$!; shift 4; '
-        '"$@"; '
-        "code=$?; kill $filler 2>/dev/null; wait $filler; rm -f runs/filler; cp -r runs kept; exit $code; }"
+    beside = (
+        '"$0" filler.py "$1" "$2" "$3" & filler=$!; shift 3; "$@"; '
+        "code=$?; kill $filler 2>/dev/null; wait $filler; rm -f runs/filler; exit $code"
     )
-    return subprocess.run(
-        [unshare, *flags, "sh", "-c", kept, size, sys.executable, *filler, *command],
-        cwd=folder, env=environment(), check=False, capture_output=True, text=True, timeout=_BOUND,
-    )  # fmt: skip
+    return on_disk_of(size, folder, "sh", "-c", beside, sys.executable, *filler, *command)
 
 
 def test_a_disk_that_fills_and_empties_costs_a_run_nothing(installed: Path, tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,6 +20,8 @@ import pytest
 
 from dcmp_hil.recording.reader import read_run
 from tests.installed import environment
+from tests.live.processes import until
+from tests.namespaces import on_disk_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,32 +50,9 @@ time.sleep(600)
 """
 
 
-def _wait(until: Callable[[], bool]) -> None:
-    end = time.monotonic() + _BOUND
-    while not until():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def _on_a_disk_of(size: str, folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    """Run a command where `runs/` is a file system of that size."""
-    (folder / "runs").mkdir()
-    unshare = shutil.which("unshare")
-    flags = ["--mount"] if os.geteuid() == 0 else ["--map-root-user", "--mount"]
-    if unshare is None or subprocess.run([unshare, *flags, "true"], check=False).returncode:
-        if os.environ.get("CI") == "true":
-            pytest.fail("this test needs a mount namespace: as root, or where users may make them")
-        pytest.skip("this test needs a mount namespace: as root, or where users may make them")
-    kept = 'mount -t tmpfs -o size="$0" none runs && "$@"; code=$?; cp -r runs kept; exit $code'
-    return subprocess.run(
-        [unshare, *flags, "sh", "-c", kept, size, *command],
-        cwd=folder, env=environment(), check=False, capture_output=True, text=True, timeout=_BOUND,
-    )  # fmt: skip
-
-
 def test_a_disk_of_64_kb_ends_a_fast_run_and_not_its_telemetry(installed: Path, tmp_path: Path) -> None:
     run = ("run", "--fast", "--duration", "1", "--viewer", "none", "--json", "figures.json")
-    done = _on_a_disk_of("64k", tmp_path, str(installed), *run)
+    done = on_disk_of("64k", tmp_path, str(installed), *run)
     assert "Traceback" not in done.stderr
     assert done.stderr.count("run.rrd is not written") == 1, done.stderr
     assert json.loads((tmp_path / "figures.json").read_text())["periods"] == 1000
@@ -82,7 +60,7 @@ def test_a_disk_of_64_kb_ends_a_fast_run_and_not_its_telemetry(installed: Path, 
 
 def test_the_picture_ends_before_the_data(installed: Path, tmp_path: Path) -> None:
     run = ("run", "--fast", "--duration", "20", "--viewer", "none")
-    done = _on_a_disk_of("5m", tmp_path, str(installed), *run)
+    done = on_disk_of("5m", tmp_path, str(installed), *run)
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("run.rrd ends here") == 1, done.stderr
     (folder,) = (tmp_path / "kept").iterdir()
@@ -128,7 +106,9 @@ def test_pages_end_with_the_process_that_serves_them() -> None:
         assert serves == "True"
         parent.kill()
         parent.wait(_BOUND)
-    _wait(lambda: not _runs(int(pid)))  # the kernel sends the signal with the end of the parent
+    until(
+        lambda: not _runs(int(pid)), "its program ended"
+    )  # the kernel sends the signal with the end of the parent
 
 
 def _runs(pid: int) -> bool:

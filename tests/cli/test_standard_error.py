@@ -6,18 +6,16 @@ import json
 import re
 import signal
 import socket
-import subprocess
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.live import run_sockets
-from tests.installed import environment
+from tests.installed import started
 from tests.live.processes import BOUND, own_folder, runs, until, until_running
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     from tests.installed import Finished
@@ -33,24 +31,6 @@ class Noisy(SuperTwisting):
         logging.getLogger("library").warning("a library's log")
         warnings.warn("a library's warning")
 """
-
-
-@contextmanager
-def _started(installed: Path, folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    with subprocess.Popen(
-        [installed, *arguments],
-        cwd=folder,
-        env=environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.kill()
 
 
 def _said(err: str) -> list[str]:
@@ -69,7 +49,7 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
     end: str, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = ("run", "--viewer", "none", "--no-record", "--duration", "0")
-    with own_folder(monkeypatch), _started(installed, tmp_path, *options) as run:
+    with own_folder(monkeypatch), started(installed, tmp_path, *options) as run:
         until_running(run)
         watchers = [socket.socket(socket.AF_UNIX) for _ in range(3)]
         for watcher in watchers:
@@ -138,12 +118,12 @@ def _unplugged(installed: Path, folder: Path) -> tuple[int | None, str]:
         "--set",
         "backend.watchdog_ms=50",
     )
-    with _started(installed, folder, "device", "--symlink", str(port)) as device:
+    with started(installed, folder, "device", "--symlink", str(port)) as device:
         assert device.stdout is not None
         assert device.stdout.readline().strip() == str(port)
         # A reference at rest: a host that is late does least harm there.
         options = (*where, "--set", "reference.kind=hold", "--duration", "0", "--viewer", "none")
-        with _started(installed, folder, "run", *options) as run:
+        with started(installed, folder, "run", *options) as run:
             until(lambda: run.poll() is not None or runs(run.pid), "the run got under way")
             device.kill()
             _, err = run.communicate(timeout=BOUND)

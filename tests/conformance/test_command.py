@@ -25,7 +25,7 @@ from tests.contract.pump import PtyPort, Pump, VirtualBus
 from tests.contract.reference_device import ReferenceDevice
 from tests.firmware.core_library import compiler
 from tests.helpers import bench
-from tests.installed import environment
+from tests.installed import environment, started
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,24 +37,6 @@ if TYPE_CHECKING:
 
 BOUND = 120.0  # s, of one process: these machines are shared
 WARNING = "warning: With --arm the motor is switched on"
-
-
-@contextmanager
-def started(installed: Path, folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [str(installed), *arguments],
-        cwd=folder,
-        env=environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate(timeout=BOUND)
 
 
 @contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ import pytest
 
 from dcmp_hil import load_rig, run
 from dcmp_hil.telemetry.rerun.sink import RerunSink
+from tests.live.processes import until
 from tests.telemetry.runs import VIEW, values
 from tests.telemetry.sinks import BOUND_S, noted
 
@@ -46,21 +46,14 @@ def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
 ) -> None:
     notes = tmp_path / "notes"
     with subprocess.Popen([sys.executable, "-c", _RUNS_ON, str(tmp_path)], stderr=subprocess.PIPE) as process:
-        _wait(lambda: notes.exists() and len(noted(notes, "rows")) >= 5)
+        until(lambda: notes.exists() and len(noted(notes, "rows")) >= 5, "rows came")
         process.send_signal(number)
         process.communicate(timeout=BOUND_S)  # until every process with its standard error has ended, too
     pid = int(noted(notes, "pid")[0])
-    _wait(lambda: not Path(f"/proc/{pid}").exists())
+    until(lambda: not Path(f"/proc/{pid}").exists(), "it ended")
     assert noted(notes, "closed") == [""]
     periods = sum(map(int, noted(notes, "rows")))
     assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == periods
-
-
-def _wait(until: Callable[[], bool]) -> None:
-    end = time.monotonic() + BOUND_S
-    while not until():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def test_a_full_disk_costs_one_warning(tmp_path: Path) -> None:

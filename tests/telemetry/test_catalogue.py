@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.telemetry.rerun import viewer as window
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from tests.live.processes import until
+from tests.namespaces import in_own_namespace
 
 _PERIODS = 4000
 _RUN = ("run", "--duration", "4", "--json", "figures.json")
@@ -51,7 +49,7 @@ class Host:
             pids = [int(pid) for pid in children.read_text().split()]
             return [pid for pid in pids if b"telemetry.child" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
-        wait(lambda: any(self.folder.glob("runs/*/run.mcap")) and bool(found()))
+        until(lambda: any(self.folder.glob("runs/*/run.mcap")) and bool(found()), "telemetry records")
         return found()[0]
 
     def recorded_bytes(self) -> int:
@@ -66,29 +64,13 @@ class Host:
         return figures, " ".join(said.split())
 
 
-def wait(until: Callable[[], bool]) -> None:
-    end = time.monotonic() + _BOUND_S
-    while not until():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
     """`runs/` is a file system of half a megabyte: each recording is a warning, every period is driven."""
     (tmp_path / "runs").mkdir()
-    unshare = shutil.which("unshare")
-    flags = ["--mount"] if os.geteuid() == 0 else ["--map-root-user", "--mount"]
     script = 'mount -t tmpfs -o size=512k none runs && exec "$@"'
-    if (
-        unshare is None
-        or subprocess.run([unshare, *flags, "true"], check=False, capture_output=True).returncode
-    ):
-        if os.environ.get("CI") == "true":
-            pytest.fail("this test needs a mount namespace: as root, or where users may make them")
-        pytest.skip("this test needs a mount namespace: as root, or where users may make them")
     command = [sys.executable, "-m", "dcmp_hil", *_RUN, "--viewer", "none"]
     done = subprocess.run(
-        [unshare, *flags, "sh", "-c", script, "sh", *command],
+        [*in_own_namespace("mount"), "sh", "-c", script, "sh", *command],
         cwd=tmp_path, check=False, capture_output=True, text=True, timeout=_BOUND_S,
     )  # fmt: skip
     figures = json.loads((tmp_path / "figures.json").read_text())
@@ -106,7 +88,7 @@ def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
 def test_s09_telemetry_that_is_killed_or_stands_still(tmp_path: Path, number: signal.Signals) -> None:
     host = Host(tmp_path, "--viewer", "none")
     pid = host.telemetry()
-    wait(lambda: host.recorded_bytes() > _SECOND_BYTES)
+    until(lambda: host.recorded_bytes() > _SECOND_BYTES, "a second was recorded")
     os.kill(pid, number)
     figures, said = host.figures(_INCOMPLETE)
     assert figures["ended_by"] == "recording_incomplete"
@@ -124,7 +106,7 @@ def test_s09_telemetry_that_is_killed_or_stands_still(tmp_path: Path, number: si
 def test_s10_a_viewer_that_is_killed_or_stands_still(tmp_path: Path, number: signal.Signals) -> None:
     host = Host(tmp_path, "--viewer", "serve")
     telemetry = host.telemetry()
-    wait(lambda: bool(window.served(_FIRST)))
+    until(lambda: bool(window.served(_FIRST)), "it was served")
     options = ["--headless", "--bind", window.LOOPBACK, "--port", "auto", "--hide-welcome-screen"]
     viewer = subprocess.Popen(
         [window.viewer_binary(), *options, "--connect", window.proxy_url(window.served(_FIRST)[0])],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from typing import Any
@@ -12,10 +11,8 @@ from typing import Any
 import pytest
 
 from dcmp_hil.telemetry.rerun import viewer as window
+from tests.namespaces import in_own_namespace
 
-_NEEDS = (
-    "a network namespace: as root, or where users may make them (sysctl kernel.unprivileged_userns_clone=1)"
-)
 _INSIDE = r"""
 import json, subprocess, sys, time
 from pathlib import Path
@@ -72,18 +69,9 @@ _LOOPBACK = {"0100007F", "00000000000000000000000001000000", "0000000000000000FF
 
 def _alone(mode: str) -> dict[str, Any]:
     """Run in a network of its own; return what was seen there."""
-    unshare = shutil.which("unshare")
-    flags = ["--net"] if os.geteuid() == 0 else ["--map-root-user", "--net"]
-    if (
-        unshare is None
-        or subprocess.run([unshare, *flags, "true"], check=False, capture_output=True).returncode
-    ):
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"this test needs {_NEEDS}")
-        pytest.skip(f"this test needs {_NEEDS}")
     environment = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY", "CI"}}
     done = subprocess.run(
-        [unshare, *flags, sys.executable, "-c", _INSIDE, mode],
+        [*in_own_namespace("net"), sys.executable, "-c", _INSIDE, mode],
         check=False, capture_output=True, text=True, timeout=90.0, env=environment,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
