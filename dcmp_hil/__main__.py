@@ -29,7 +29,7 @@ def main() -> None:
 
 
 def _stop(arguments: list[str]) -> object:
-    """Do what `stop` and `stop --run PID` ask for; return what became of it, None for any other command."""
+    """Execute `stop` and `stop --run PID`; return the result, None for any other command."""
     run: int | None = None
     match arguments:
         case ["stop"]:

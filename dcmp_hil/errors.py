@@ -59,11 +59,11 @@ class SampleTimeoutError(BackendError):
 
 
 class ProtocolError(BackendError):
-    """What arrived contradicts the protocol, such as time that stands still."""
+    """A received message contradicts the protocol, such as a time that stands still."""
 
 
 class Explanation(NamedTuple):
-    """What a trip says once its cause was found: the arguments of TripError."""
+    """Explanation of a trip once its cause was found: the arguments of TripError."""
 
     reason: str
     sentence: str

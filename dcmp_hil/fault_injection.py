@@ -1,4 +1,4 @@
-"""Where faults on purpose come into a run; without a plan nothing does."""
+"""Hooks for injected faults in a run; without a plan they do nothing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _INJECT, _NEEDS_WIRE = "sim_backend.faults.plan:inject", "sim_backend.faults.pla
 
 
 class Faults(Protocol):
-    """What goes wrong on purpose in one run, as those who make its stages see it."""
+    """Protocol of the injected faults of one run, for the code that makes its stages."""
 
     def backend(self, factory: Callable[..., Backend], rig: Rig, clock: Clock) -> Backend:
         """Make the backend, with its faults between device and loop."""

@@ -1,4 +1,4 @@
-"""What a run leaves behind: figures, columns, events, and how device and link fared."""
+"""Result of a run: figures, columns, events, device and link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run: builds the line, runs it, ends it at 0 V, and keeps the figures."""
+"""A run: builds the loop, runs it, ends it at 0 V, and keeps the figures."""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ class Session:
         return nullcontext()
 
     def _warn_live(self, sentence: str) -> None:
-        """Have the loop tell of something; called from another thread."""
+        """Ask the loop to report a warning; called from another thread."""
         if isinstance(self._line.changes, LiveChanges):
             self._line.changes.warn(sentence)
 
@@ -219,7 +219,7 @@ class Session:
             loop.run(line, t + line.delay + LOWERING, self.stop)
 
     def _tell(self, level: Level, kind: EventKind, text: str, data: EventData | None = None) -> None:
-        """Tell of something at the device time of the last period."""
+        """Report an event at the device time of the last cycle."""
         self._recorder.event(Event(self._recorder.t, level, kind, text, data))
 
     def _tell_how_device_ended(self) -> None:
@@ -233,7 +233,7 @@ class Session:
             self._tell("WARN", EventKind.DEVICE_END, sentence)
 
     def _say_where(self) -> None:
-        """Tell of the computer, and of what it did not grant."""
+        """Report the computer, and the requests that it did not grant."""
         self._recorder.event(Event(0.0, "INFO", EventKind.HOST, in_words(self._host)))
         for grant in self._realtime.grants if self._realtime else ():
             said = "granted" if grant.granted else grant.refusal
@@ -272,7 +272,7 @@ class Session:
 
 
 def _end_after(error: BaseException) -> tuple[Literal["INFO", "ERROR"], str]:
-    """Say what is known of the amplifier after an error: a device that did not answer confirmed nothing."""
+    """Return level and sentence on the amplifier after an error; without an answer, 0 V is not confirmed."""
     if isinstance(error, OpenError):
         return "INFO", "the device was not armed"
     if isinstance(error, BackendError) or getattr(error, "__notes__", None):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Urgency(Enum):
-    """How long the way to 0 V may take."""
+    """Time that the way to 0 V may take."""
 
     NOW = auto()  # 0 V in this period
     RAMP = auto()  # authority shrinks to 0 V within 50 ms

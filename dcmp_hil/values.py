@@ -34,7 +34,7 @@ class Sample(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """What the observer believes at the instant of the sample."""
+    """Estimate of the observer at the instant of the sample."""
 
     position: float  # rad
     velocity: float  # rad/s
@@ -42,7 +42,7 @@ class Estimate(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What the simulated plant knows and no loop may see; NaN on a real rig."""
+    """True state of the simulated plant, hidden from the loop; NaN on a real rig."""
 
     position: float  # rad
     velocity: float  # rad/s
@@ -66,7 +66,7 @@ class Timing(NamedTuple):
 
 
 class Cycle(NamedTuple):
-    """One period, whole: all that telemetry and the black box ever see."""
+    """Values of one complete cycle, as telemetry and the black box get them."""
 
     sample: Sample
     estimate: Estimate
@@ -77,7 +77,7 @@ class Cycle(NamedTuple):
 
 
 class EventKind(StrEnum):
-    """What an event tells. Programs read kind and data; the text is for people, and no program reads it."""
+    """Kinds of events. Programs read kind and data; the text is for people, and no program reads it."""
 
     HOST = "host"  # the computer
     GRANT = "grant"  # what the operating system granted, or refused

@@ -35,7 +35,7 @@ class Amplifier:
         self.live = False
 
     def command(self, voltage: float) -> None:
-        """Take the newest command, V; a number that is not finite counts as 0 V."""
+        """Set the newest command, V; a number that is not finite counts as 0 V."""
         self._newest = voltage if math.isfinite(voltage) else 0.0
 
     def release(self) -> None:

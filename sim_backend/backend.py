@@ -90,7 +90,7 @@ class SimBackend:
         return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
 
     def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
-        """Let the periods pass that are due already; return the voltage of the last one, V, and its tick."""
+        """Simulate the periods that are due already; return the voltage of the last one, V, and its tick."""
         for _ in range(self._pace.missed(tick)):
             voltage = self._amplifier.step()
             self._truth = self._plant.advance(voltage)
@@ -98,7 +98,7 @@ class SimBackend:
         return voltage, tick
 
     def write(self, voltage: float) -> None:
-        """Give a voltage to the amplifier, V."""
+        """Send a voltage to the amplifier, V."""
         self._amplifier.command(voltage)
 
     def truth(self) -> Truth:

@@ -1,4 +1,4 @@
-"""Where faults come between the parts of a simulated rig; by default nothing does."""
+"""Hooks for faults between the parts of a simulated rig; by default they do nothing."""
 
 from __future__ import annotations
 

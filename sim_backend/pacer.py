@@ -32,7 +32,7 @@ class Pacer:
         self._start_ns = self._clock.now_ns()
 
     def stretch(self, factor: float) -> None:
-        """Let a period last `factor` times as long from the newest tick on."""
+        """Make one period `factor` times as long, from the newest tick on."""
         before, self._period_ns = self._period_ns, factor * self._period_ns
         self._start_ns += int(self._tick * (before - self._period_ns))
 

@@ -43,7 +43,7 @@ _INTERRUPTED = 130
 
 
 class Carrier(StrEnum):
-    """How frames travel."""
+    """Carriers of frames."""
 
     COBS = "cobs"
     SLCAN = "slcan"
@@ -113,7 +113,7 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
 
 
 class _Place:
-    """Where the device is."""
+    """Port, link and node of the device."""
 
     def __init__(
         self, port: str, link: Carrier | None, interface: str, baud: int, bitrate: int, node: int
@@ -151,7 +151,7 @@ def _chosen(checks: Sequence[Check], only: Sequence[str]) -> list[Check]:
 
 
 def _confirm(*, yes: bool) -> None:
-    """Say what moves, and have it confirmed.
+    """Print what will move, and ask the user to confirm.
 
     Raises
     ------

@@ -30,7 +30,7 @@ _RUN_WITH = {
 
 
 class LinkName(StrEnum):
-    """How frames travel on the port."""
+    """Carriers of frames on the port."""
 
     COBS = "cobs"
     SLCAN = "slcan"

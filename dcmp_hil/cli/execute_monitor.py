@@ -50,7 +50,7 @@ class _Ticks:
         self._told: set[int] = set()
 
     def take(self, node: int, message: Message) -> None:
-        """Take a message of a node."""
+        """Process a message of a node."""
         if not isinstance(message, SampleReport) or node in self._told:
             return
         watch = self._watches.setdefault(node, TickWatch())

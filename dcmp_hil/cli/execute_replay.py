@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Outputs(NamedTuple):
-    """Where everything goes.
+    """Output files of a replay.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _figures(result: ReplayResult) -> dict[str, Any]:
 
 
 def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
-    """Where CSV and .rrd go: never onto the recording itself."""
+    """Return the paths of CSV and .rrd; neither is the recording itself."""
     named = outputs.csv, outputs.rrd
     defaults = (Path(f"{file.stem}-replay{suffix}") for suffix in (".csv", ".rrd"))
     if not outputs.force:  # what an earlier replay left stays

@@ -48,7 +48,7 @@ _PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line asked for; None where it said nothing."""
+    """Options of the command line; None if an option was not given."""
 
     duration: float | None
     window_from: float
@@ -129,7 +129,7 @@ def _session(
 
 
 class _End(NamedTuple):
-    """How a run ended: in a word that stays the same, with what error, with which exit code if with none."""
+    """End of a run: a fixed word, the error, and the exit code without an error."""
 
     ended_by: str
     error: BaseException | None
@@ -153,7 +153,7 @@ def _to_its_end(session: Session) -> _End:
 
 
 def _control(rig: Rig, options: Options, folder: RunFolder | None) -> ControlProcess | None:
-    """Let others stop and change the run while it goes on; in virtual time it is over too soon."""
+    """Return the process through which clients control the run; None in virtual time."""
     if options.fast:
         return None
     from dcmp_hil.live.process import ControlProcess
@@ -188,7 +188,7 @@ def _wants_picture(options: Options) -> bool:
 
 
 def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> str:
-    """Keep and print the figures of every kind of end; return what its folder lacks, a sentence."""
+    """Write and print the figures after every kind of end; return a sentence on what the folder lacks."""
     cut_off = session.stop.requested
     with session.stop.held():
         result = session.result()

@@ -44,7 +44,7 @@ def stop(run: Run = None) -> None:
 
 
 def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
-    """Say what became of STOP, and leave with its exit code."""
+    """Print the result of STOP, and exit with its code."""
     if isinstance(stopped, DcmpError):
         raise stopped
     from dcmp_hil.live.stop_command import End
@@ -60,7 +60,7 @@ def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
 
 
 def status(run: Run = None) -> None:
-    """Say in one line where a run stands."""
+    """Print the state of a run in one line."""
     from dcmp_hil.live.client import find_run
     from dcmp_hil.live.client import status as ask
 
@@ -80,7 +80,7 @@ def status(run: Run = None) -> None:
 
 
 def _phase(state: dict[str, Any]) -> str:
-    """Name the phase; what a run said before it fell silent is told as old."""
+    """Return the phase in words; mark the state of a silent run as old."""
     phase, age = str(state.get("phase")), state.get("age_s")
     return f"silent for {age:.1f} s, before that:" if phase == "silent" and age else phase
 

@@ -19,7 +19,7 @@ _REMEDY = "Choose a file you may write, in a folder that exists."
 def try_places(
     places: Mapping[str, Path | None], inputs: Mapping[str, Path] | None = None, *, force: bool = False
 ) -> None:
-    """Look whether files could be written, without making, changing or touching any.
+    """Check that files can be written, without creating or changing any.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _refusal(path: Path, inputs: Mapping[str, Path], taken: Mapping[Path, str], 
 
 
 def try_folder(option: str, folder: Path) -> None:
-    """Look whether a folder is there, or could be made, and could be written.
+    """Check that a folder exists or can be created, and can be written.
 
     Raises
     ------

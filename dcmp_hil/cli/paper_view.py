@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class _Shown(NamedTuple):
-    """How a quantity is shown: its name, and a unit that keeps its figures short."""
+    """Display of a quantity: its name, and a unit that keeps its figures short."""
 
     name: str
     unit: str
@@ -44,7 +44,7 @@ _COLUMNS_SHOWN = {
 
 
 def reproduction_table(reproduction: Reproduction) -> Table:
-    """Lay out what the paper claims, what its equations give, printed and corrected, and the verdict."""
+    """Return the table of claims, results of the printed and corrected equations, and verdicts."""
     start, stop = reproduction.corrected.summary.window_s
     table = _table(f"The paper, reproduced: errors and peak from {start:g} to {stop:g} s")
     table.caption = "claimed: errors are orders of magnitude, the time is an upper bound"

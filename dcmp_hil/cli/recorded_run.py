@@ -1,4 +1,4 @@
-"""What the command line does with a run's own recording: export it, run it again."""
+"""Commands for a run's own recording: export it, run it again."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Kept(NamedTuple):
 
 
 def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
-    """Look at the end of the recording of a run.
+    """Check the end of a run's recording.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
 
 
 def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture: bool) -> str:
-    """Say that a run will not fit on its disk; nothing where it will.
+    """Return a warning that a run will not fit on its disk; empty if it will.
 
     Parameters
     ----------

@@ -172,7 +172,7 @@ class Given:
 
 
 def _settings_of(rig: Rig, *, named: bool) -> dict[str, Any]:
-    """Say a rig's observer, model and encoder in the words of `ReplaySettings`."""
+    """Return a rig's observer, model and encoder as keys of `ReplaySettings`."""
     found: dict[str, Any] = {"model": rig.model.values(), "observer": rig.observer.kind}
     if named or "ku_rad_s2_V" in rig.model.model_fields_set:
         found["ku"] = rig.model.ku_rad_s2_V

@@ -66,12 +66,12 @@ class RunFolder:
 
     @property
     def recording(self) -> Path:
-        """Where the recording goes."""
+        """Return the path of the viewer's recording."""
         return self.path / "run.rrd"
 
     @property
     def own(self) -> Path:
-        """Where the run's own recording goes, with every period."""
+        """Return the path of the run's own recording."""
         return self.path / "run.mcap"
 
     def write(self, rig: Rig, document: dict[str, Any], error: BaseException | None) -> list[str]:
@@ -98,7 +98,7 @@ class RunFolder:
                 self.path.parent.rmdir()
 
     def tell(self, record: Path | None, *, live: bool) -> None:
-        """Say where things are and how to look at them."""
+        """Print the paths of the files, and the commands that show them."""
         if not self.path.exists():  # a warning has said so
             return
         console.note(f"kept in {self.path}/")
@@ -145,7 +145,7 @@ def _black_box(trip: TripError) -> str:
 
 
 def _viewer_command() -> str:
-    """Say how to call the viewer: it is installed beside this Python, which need not be on the path."""
+    """Return the command of the viewer: it is installed beside this Python, which need not be on the path."""
     beside = Path(sys.executable).with_name("rerun")
     if shutil.which("rerun") or not beside.exists():
         return "rerun"

@@ -83,7 +83,7 @@ class _Replacing:
         return warnings
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         if not self._began and len(block):
             self._began = True
             with suppress(FileNotFoundError):  # there is no room for one, and a warning has said so
@@ -91,7 +91,7 @@ class _Replacing:
         self._sink.block(block)
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         self._sink.event(event)
 
     def close(self) -> None:

@@ -57,7 +57,7 @@ class StatusLine:
             self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING))
 
     def close(self) -> None:
-        """Take the line away; the summary follows."""
+        """Remove the status line; the summary follows."""
         if self._live is not None:
             self._live.stop()
 

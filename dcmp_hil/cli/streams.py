@@ -61,7 +61,7 @@ class _Descriptor(io.FileIO):
 
 
 def guard() -> None:
-    """Let `sys.stdout` and `sys.stderr` survive what their other ends do; calling it again changes nothing.
+    """Keep errors of the readers from `sys.stdout` and `sys.stderr`; a second call changes nothing.
 
     Characters that an encoding lacks are replaced by similar ones, or by a question mark. Descriptors that
     the caller closed lead to the null device: the next file that is opened would else take their place.

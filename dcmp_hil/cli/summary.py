@@ -20,7 +20,7 @@ _BARS = " ▁▂▃▄▅▆▇█"
 
 
 def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
-    """Lay the figures out: what, value, unit; then the durations, a quantile a column."""
+    """Return tables of the figures (name, value, unit) and of the durations (one quantile a column)."""
     start, stop = result.summary.window_s
     title = Text.assemble((rig.name, "bold"), f"  {start:.2f} to {stop:.2f} s, ended by {ended_by}")
     return Group(title, "", _figures(result), "", _durations(result), *_refusals(result))
@@ -123,7 +123,7 @@ def _bars(histogram: Histogram) -> str:
 
 
 def _refusals(result: Result) -> list[Text]:
-    """Say what of real time the system did not grant, a line each."""
+    """Return one line for each request of real time that the system did not grant."""
     refused = [grant for grant in result.grants if not grant.granted]
     lines = [
         Text.assemble((grant.what, "yellow"), f" was not granted: {grant.refusal}.") for grant in refused

@@ -39,7 +39,7 @@ def chosen(viewer: Viewer | None) -> Viewer:
 
 
 def watched(sink: RerunSink, viewer: Viewer) -> Sink:
-    """Tell where a run is served, and serve pages as long as it lasts."""
+    """Report the address at which a run is served, and serve pages until it ends."""
     if sink.port is not None and others_here():
         console.note(
             f"every user of this computer can connect to the dashboard on port {sink.port}, read it, and "
@@ -63,11 +63,11 @@ class _WithPages:
         self._pages.enter_context(web_viewer(port))
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         self._sink.block(block)
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         self._sink.event(event)
 
     def close(self) -> None:

@@ -1,1 +1,1 @@
-"""What every room may use: the base of rig.toml's tables, CSV, text, files, tuples, pictures."""
+"""Code for every package: the base of rig.toml's tables, CSV, text, files, tuples, pictures."""

@@ -45,7 +45,7 @@ class Text(NamedTuple):
     lines: list[int]
 
     def place(self, row: int) -> str:
-        """Say where a row (from 0) is to be found."""
+        """Return the place of a row (from 0) for a message."""
         return f"{self.path}, row {row + 1} (line {self.lines[row]})"
 
 

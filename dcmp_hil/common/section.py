@@ -1,4 +1,4 @@
-"""What every table of rig.toml shares: strict types, no unknown key, units and bounds in the schema."""
+"""Base of every table of rig.toml: strict types, no unknown key, units and bounds in the schema."""
 
 from __future__ import annotations
 

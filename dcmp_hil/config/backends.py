@@ -23,7 +23,7 @@ class Capacity(NamedTuple):
 
 
 class Traits:
-    """What a kind of backend is: for rules, warnings, fault plans and the dashboard."""
+    """Properties of a kind of backend, for rules, warnings, fault plans and the dashboard."""
 
     simulated: ClassVar[bool] = False
     """Whether the plant is that of [sim]; of a module:Factory it is not known before it is made."""

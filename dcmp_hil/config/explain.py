@@ -1,4 +1,4 @@
-"""What a rig comes to, key by key, and what in it is legal but questionable."""
+"""Values of a rig, key by key, and warnings of settings that are legal but questionable."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
 
 
 def _kinds(prefix: str, name: str) -> str:
-    """Say what else the `kind` of a table may be."""
+    """Return the other kinds of a table."""
     section = prefix.removesuffix(".")
     return f"Kind: {kinds_in_words(section)}." if name == "kind" and section in KINDS else ""
 
@@ -147,7 +147,7 @@ def _is_ideal(rig: Rig) -> bool:
 
 
 def _signs(rig: Rig) -> str:
-    """Tell who sets a sign to see a reversed motor, and sees none."""
+    """Return a warning of a sign that has no effect in a simulated rig."""
     turned = [
         (f"{key}.sign", fault)
         for key, section, fault in (

@@ -49,7 +49,7 @@ def dotted(parts: Iterable[str]) -> str:
 
 
 def describe(schema: Mapping[str, Any]) -> str:
-    """Say in words what a JSON schema of one value allows."""
+    """Return in words what a JSON schema of one value allows."""
     if "anyOf" in schema:
         return " or ".join(describe(one) for one in schema["anyOf"] if one.get("type") != "null")
     if "const" in schema:

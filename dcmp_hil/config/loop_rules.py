@@ -68,7 +68,7 @@ def loops(rig: Rig) -> list[LinearLoop]:
 
 
 def _fault(rig: Rig) -> Callable[[], str] | None:
-    """Find what is wrong, and what says it: margins take longer than the question whether there are any."""
+    """Return a function that describes the fault, None without one; only it computes the margins."""
     if rig.supervisor.monitors != "all":
         return None
     if isinstance(rig.observer, PaperSettings) and (fault := _euler_fault(rig, rig.observer)):
@@ -84,7 +84,7 @@ def _fault(rig: Rig) -> Callable[[], str] | None:
 
 
 def _rough(loop: LinearLoop, limit: float) -> str:
-    """Name what the encoder's steps alone cost, in V and V/s."""
+    """Return a fault if the encoder's steps alone shake the voltage too much, in V and V/s."""
     (noise, _), variation = loop.noise_V(), loop.variation_V_s()
     if noise > _NOISE_VOLTAGE_SHARE_MAX * limit:
         return (
@@ -101,7 +101,7 @@ def _rough(loop: LinearLoop, limit: float) -> str:
 
 
 def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
-    """Name a differentiator that gravity leaves behind: neither its floor nor its slope follows the arm."""
+    """Return a fault if the differentiator cannot follow gravity: neither by its floor nor by its slope."""
     tuning = observer.tuning(ObserverContext(rig.model.values(), rig.period, rig.encoder.counts))
     fastest = rig.model.gravity_rad_s2 * rig.supervisor.velocity_limit_rad_s
     if observer.mu0_rad_s is None or tuning.mu0 >= _OBSERVER_BANDWIDTH_MIN_RAD_S or fastest <= tuning.M:
@@ -115,7 +115,7 @@ def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
 
 
 def _euler_fault(rig: Rig, observer: PaperSettings) -> str:
-    """Name what makes the paper's explicit Euler steps run away, or swing by more than the arm ever does."""
+    """Return a fault if the paper's explicit Euler steps diverge, or oscillate by more than the arm does."""
     step, count = rig.period, rig.encoder.count
     copy = np.array([[-observer.L1_1_s, 1.0], [-observer.L2_1_s2, -rig.model.f0_1_s]])
     if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH_MIN_1_S * step:
@@ -156,7 +156,7 @@ def _unstable(loop: LinearLoop) -> str:
 
 
 def _told(fault: str, loop: LinearLoop) -> str:
-    """Say a fault, and how far from the edge of stability the loop is."""
+    """Return a fault in words, with the margin of stability."""
     margins, robust = loop.margins(), loop.robustness()
     stable = "it is not stable"
     if margins is not None and robust is not None:
@@ -171,7 +171,7 @@ def _told(fault: str, loop: LinearLoop) -> str:
 
 
 def _blamed(rig: Rig) -> str:
-    """Find the key that alone makes the difference; else name the proportional gain."""
+    """Return the key that alone makes the difference; else the proportional gain."""
     for table, name in _GAIN_KEYS:
         section = getattr(rig, table)
         if name not in section.model_fields_set:

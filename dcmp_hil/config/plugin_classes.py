@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check_named(rig: Rig) -> None:
-    """Look whether every class that the rig names is there and could be made.
+    """Check that every class that the rig names exists and could be made.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How far, how fast and how hard a reference asks the arm to move, and what of it the rig can do."""
+"""Position, speed and acceleration that a reference requests, compared with the rig's limits."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def peaks(rig: Rig) -> Peaks:
 
 
 def beyond_reach(rig: Rig) -> list[str]:
-    """Name what the reference asks for and cannot get, a sentence each: what is done instead."""
+    """Return a sentence for each limit that the reference exceeds, and what is done instead."""
     return [] if rig.supervisor.monitors == "finite" else list(_beyond(rig))
 
 

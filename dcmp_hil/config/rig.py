@@ -77,7 +77,7 @@ ReferenceSection = Annotated[
 
 
 class Rig(Section):
-    """Everything about one rig and one way of running it."""
+    """Settings of one rig and of its run."""
 
     name: str = Field(default="rig", max_length=60, pattern=r"^\w[\w.-]*$", examples=["my-rig"])
     """What the run's folder and the dashboard call it: up to 60 letters, digits, and . _ - inside."""
@@ -109,7 +109,7 @@ class Rig(Section):
 
     @property
     def plugin_folders(self) -> tuple[Path, ...]:
-        """Where a `module:Class` is looked for beside what is installed."""
+        """Folders in which a `module:Class` is searched, besides installed packages."""
         return (Path(),) if self._folder is None else (self._folder, Path())
 
     @property
@@ -137,7 +137,7 @@ class Rig(Section):
 
     @property
     def reference_accelerations(self) -> tuple[float, float]:
-        """What a reference may ask for, and what a stop may reckon with, rad/s2; infinite without a limit.
+        """Return the accelerations of a reference and of a stop, rad/s2; infinite without a limit.
 
         Gravity helps at the ends of a swing; a stop has it against itself. Both leave the controller room.
         """
@@ -148,7 +148,7 @@ class Rig(Section):
 
     @property
     def impossible_on_a_wire(self) -> list[str]:
-        """What in this rig no device has, not even a simulated one."""
+        """Return the settings that no device supports, not even a simulated one."""
         ideal = (
             ('encoder.counts_per_rev = "ideal"', self.encoder.counts is None),
             ('amplifier.voltage_limit_V = "none"', math.isinf(self.amplifier.limit)),
@@ -158,7 +158,7 @@ class Rig(Section):
 
     @property
     def simulation_only(self) -> list[str]:
-        """What in this rig no amplifier or encoder of iron may be run with."""
+        """Return the settings that are allowed in a simulation only."""
         loose = (
             ('supervisor.monitors = "finite"', self.supervisor.monitors == "finite"),
             ('supervisor.start = "immediate"', self.supervisor.start == "immediate"),

@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", r
 
 
 def for_unknown_key(path: tuple[str, ...], value: Any, model: type[BaseModel]) -> str:
-    """Say what may have been meant by the key at `path`, in a table that is described by `model`."""
+    """Return a remedy for the unknown key at `path`, in a table that is described by `model`."""
     key, known = path[-1], list(model.model_fields)
     return (
         _other_unit(key, value, known)
@@ -32,7 +32,7 @@ def for_unknown_key(path: tuple[str, ...], value: Any, model: type[BaseModel]) -
 
 
 def for_unknown_kind(section: str, got: Any) -> str:
-    """Say which kinds a table may have, and which of them was perhaps meant."""
+    """Return a remedy for an unknown kind: the known kinds, and the likely one."""
     kinds = [name for name in KINDS[section] if name != "custom"]
     close = get_close_matches(str(got), kinds, n=1, cutoff=0.4)
     hint = f' Did you mean "{close[0]}"?' if close else ""
@@ -47,7 +47,7 @@ def kinds_in_words(section: str) -> str:
 
 
 def for_text(key: str, text: str, schema: Mapping[str, Any]) -> str:
-    """Say what a text that is not allowed may have been meant to be."""
+    """Return a remedy for a text that is not allowed."""
     branches = [schema, *schema.get("anyOf", [])]
     words = {
         str(word): word
@@ -110,7 +110,7 @@ def _as_float(value: Any) -> float:
 
 
 def _other_home(path: tuple[str, ...], key: str) -> str:
-    """Look for exactly this key with the other kinds of the table, then in every other table."""
+    """Return where exactly this key exists: in another kind of the table, or in another table."""
     here = path[0] if len(path) > 1 else ""
     kinds = [kind for kind, model in KINDS.get(here, {}).items() if key in model.model_fields]
     if kinds:

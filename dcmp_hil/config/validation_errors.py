@@ -49,7 +49,7 @@ def explain_faults(
 
 
 def _place(path: tuple[str, ...], place: str, set_keys: Collection[str]) -> str:
-    """Say where a key was written: in the file, or in an override of it or of a table around it."""
+    """Return where a key was written: in the file, or in an override of it or of a table around it."""
     around = (".".join(path[:depth]) for depth in range(1, len(path) + 1))
     return "--set" if any(key in set_keys for key in around) else f"{place},"
 

@@ -1,4 +1,4 @@
-"""How much the voltage of a rig should vary: what its encoder costs with its gains, and its reference."""
+"""Expected variation of a rig's voltage, caused by its encoder, its gains and its reference."""
 
 from __future__ import annotations
 

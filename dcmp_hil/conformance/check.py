@@ -1,4 +1,4 @@
-"""What a check is, and what comes of one."""
+"""Check of a device, and its result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class NotJudgedError(Exception):
 
 
 class Verdict(StrEnum):
-    """How a check ended."""
+    """Verdicts of a check."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that the page says of a device.
+    """A requirement of the page, and the function that checks it.
 
     Parameters
     ----------

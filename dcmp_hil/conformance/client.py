@@ -1,4 +1,4 @@
-"""One host that speaks docs/protocol.md and judges time by the device's own ticks."""
+"""A host for conformance checks, which measures time by the device's own ticks."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SESSIONS = 0xFFFF
 
 
 class Client(Listener):
-    """One side of a conversation with one device; made as a Listener is."""
+    """A host that sends requests to one device; constructed like a Listener."""
 
     def after_fence(self, mark: int) -> list[Seen]:
         """Return the SAMPLEs since `mark`, once the device has had all that was sent, and two ticks."""

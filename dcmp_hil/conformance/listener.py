@@ -1,4 +1,4 @@
-"""What a device says on a line, timed by its own ticks."""
+"""Messages of a device on a line, timed by its own ticks."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Listener:
                 return
 
     def join(self, tick: int) -> None:
-        """Take the parameter TICK, read a moment ago, as what SAMPLE's tick goes on from."""
+        """Continue SAMPLE's tick from the parameter TICK, which was just read."""
         self.tick = nearest(tick, self.samples[-1].sample.tick, 8)
         self._offset_us = None
 
@@ -161,7 +161,7 @@ class Listener:
 
     @property
     def reach(self) -> int:
-        """How many periods old the SAMPLE of a DRIVE may be."""
+        """Return the age, in periods, that the SAMPLE of a DRIVE may have."""
         return -(-_AGE_US // self.period_us)
 
     def periods(self, milliseconds: float) -> int:

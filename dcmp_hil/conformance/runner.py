@@ -176,7 +176,7 @@ def leave(client: Client) -> None:
 
 
 def _hear_a_little(client: Client) -> None:
-    """Take what waits, and up to three messages more; a device may be silent."""
+    """Read the waiting messages, and up to three more; a device may be silent."""
     client.drain()
     for _ in range(3):
         client.take(_BRIEF_S)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Change(NamedTuple):
-    """What is to be different from the next period on; None stays as it is."""
+    """A change that acts from the next cycle on; None means unchanged."""
 
     words: str  # "controller.kp_1_s2: 4000 -> 5200", for people
     values: Mapping[str, float | str]  # new values by dotted key, for programs

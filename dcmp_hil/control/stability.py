@@ -71,7 +71,7 @@ class Margins(NamedTuple):
 
 
 class Robustness(NamedTuple):
-    """What the loop, broken at the motor, has in hand; the least over its crossings of gain 1."""
+    """Margins of the loop, opened at the motor: the smallest over its crossings of gain 1."""
 
     phase_deg: float
     crossover_rad_s: float  # where that is

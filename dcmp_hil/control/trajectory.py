@@ -64,7 +64,7 @@ class Trajectory:
         self._plain_from = math.inf
 
     def change(self, t: float, source: ReferenceSource) -> None:
-        """Go over into another reference from device time `t` on (s), with no jump up to the acceleration.
+        """Change to another reference from device time `t` on (s), continuous up to the acceleration.
 
         The difference of the two at `t` is what a quintic takes to 0: in a second, or as much longer as
         2 rad/s and 10 rad/s2 ask for. However often that is done, one quintic is left to work out.

@@ -135,7 +135,7 @@ class DeviceBackend:
 
     @property
     def counters(self) -> LinkCounters:
-        """What was lost, late and damaged since the device was armed; a copy."""
+        """Return a copy of the counts of lost, late and damaged frames since the device was armed."""
         return self._meter.counters
 
     @property
@@ -144,12 +144,12 @@ class DeviceBackend:
         return self._meter.health
 
     def concerns(self, counters: LinkCounters) -> list[Concern]:
-        """Say what these counters mean, by the rates of `[backend]`."""
+        """Return the problems that these counters show, by the rates of `[backend]`."""
         return judge(counters, *self._rates)
 
     @property
     def described(self) -> str:
-        """What the device says it is, once it is open."""
+        """Return the device's description of itself, once it is open."""
         cleared = f", its fault {self._cleared} was cleared" if self._cleared else ""
         firmware = f"firmware {self.firmware}, protocol {PROTOCOL_HASH:08x}"
         return f"{self._link.name}, node {self._node}, {firmware}, {self._history}{cleared}"

@@ -1,4 +1,4 @@
-"""What a device tells of its past: boots, why it was reset, and the fault before that."""
+"""History of a device: boots, the cause of the last reset, and the fault before it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class History(NamedTuple):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What of it a person should look at before the motor runs."""
+        """Points that a person should check before the motor runs."""
         found = []
         if self.cause in _REMEDIES:
             found.append(f"The device was reset by its {self._cause}. {_REMEDIES[self.cause]}")

@@ -160,7 +160,7 @@ class Caller:
         self.say(question)
 
     def _await_owed(self, key: object) -> None:
-        """Hear late answers to earlier questions of the same kind."""
+        """Receive late answers to earlier requests of the same kind."""
         while (owed := self._owed.get(key)) is not None:
             left_ns = owed.until_ns - self._clock.now_ns()
             if owed.answers <= 0 or left_ns <= 0:

@@ -14,7 +14,7 @@ _SLOPES_MAX = 12  # older ones say nothing of the clock as it goes now
 
 
 class ClockRatio:
-    """How fast the device's clock goes.
+    """Rate of the device's clock against this computer's.
 
     A sample may arrive late and never early, so the earliest arrival of a window of 256 ticks shows the
     shortest delay of the line. How that moves from window to window is the error of the clock; the median
@@ -36,7 +36,7 @@ class ClockRatio:
         self._slopes: deque[float] = deque(maxlen=_SLOPES_MAX)
 
     def add(self, tick: int, heard_ns: int) -> None:
-        """Take a sample's tick, and the instant of its arrival."""
+        """Add a sample's tick, and the instant of its arrival."""
         offset = heard_ns - tick * self._period_ns
         if tick >= self._ends:
             self._close_window(tick)
@@ -46,7 +46,7 @@ class ClockRatio:
 
     @property
     def error(self) -> float | None:
-        """How much the device's clock is fast, as a share: -0.02 is 2 % slow; None if not known."""
+        """Return the relative error of the device's clock: -0.02 is 2 % slow; None if not known."""
         if len(self._slopes) < _SLOPES_MIN:
             return None
         longer = median(self._slopes)  # a nominal period takes so much longer than it should

@@ -1,4 +1,4 @@
-"""What a device says of itself, held against what can be, and against the rig."""
+"""Checks of a device's parameters, for plausibility and against the rig."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def is_possible(parameter: Parameter, value: int) -> bool:
 
 
 def differences(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
-    """Say where the device does not fit the rig, each with its remedy.
+    """Return the differences of device and rig, each with its remedy.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def differences(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
 
 
 def remarks(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
-    """Say what of the device the rig does not know, and can run without."""
+    """Return remarks on properties of the device that the rig does not state and does not need."""
     slew = device[Parameter.SLEW_MV_PER_MS]
     sentence = (
         f"amplifier.slew_V_s: the rig says none, the device changes its voltage by {slew:g} V/s at most. Put "
@@ -90,7 +90,7 @@ def _same(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
 
 
 def _supply(asked_mV: int, found_mV: int) -> str:
-    """Say where rig and board have different supplies: every voltage is wrong by their ratio."""
+    """Return a fault if rig and board have different supplies: every voltage is wrong by their ratio."""
     if found_mV == asked_mV:
         return ""
     rig = f"{1e-3 * asked_mV:g}" if asked_mV else '"none"'
@@ -107,7 +107,7 @@ def _supply(asked_mV: int, found_mV: int) -> str:
 
 
 def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
-    """Say which limits of the device are below the rig's.
+    """Return the limits of the device that are below the rig's.
 
     Travel as the board was built with it counts from where the device was armed first: with a zero that is
     a count that may be half a turn from hanging.

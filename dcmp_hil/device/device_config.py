@@ -1,4 +1,4 @@
-"""What host and device must agree on, and how the wire's whole numbers become radians and volts."""
+"""Settings common to host and device, and conversion of the wire's integers to radians and volts."""
 
 from __future__ import annotations
 

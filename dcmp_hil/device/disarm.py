@@ -21,7 +21,7 @@ _AT_REST = (State.BOOT, State.IDLE, State.FAULT)
 
 
 class DeviceEnd(NamedTuple):
-    """How a device was left."""
+    """Last state and fault of a device after a run."""
 
     state: str  # IDLE, FAULT ...
     fault: str  # its name; empty without one
@@ -47,7 +47,7 @@ class Goodbye:
         self._session, self._ttl_ms = session, ttl_ms
 
     def run(self, *, answered: bool) -> DeviceEnd | None:
-        """Say goodbye; None if the device did not confirm 0 V, disarmed.
+        """Disarm the device; return its last state, None if it did not confirm 0 V and disarmed.
 
         Parameters
         ----------

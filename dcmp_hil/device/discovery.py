@@ -1,4 +1,4 @@
-"""Who is there: serial ports and CAN channels, and the device on each."""
+"""Discovery of serial ports and CAN channels, and of the device on each."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _KEYS_WITH_DEFAULT = ("node", "baud", "bitrate")  # that it names where they are
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is on one port or channel: a device, one of several, or nothing of ours.
+    """Result for one port or channel: a device, one of several, or no device of this project.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def find_devices(
     *,
     history: bool = False,
 ) -> Iterator[Finding]:
-    """Look at every serial port and CAN channel, and at ports named besides.
+    """Yield the findings on every serial port and CAN channel, and on the named ports.
 
     It listens first, and writes nothing: it asks only where a device of ours was heard. Other people's
     equipment is left alone.
@@ -239,7 +239,7 @@ def _describe(caller: Caller, node: int, *, twice: bool) -> str:
 
 
 def state_in_words(sample: SampleReport) -> str:
-    """Name the state of a device, and its fault."""
+    """Return state and fault of a device in words."""
     state = State(sample.state).name if sample.state in set(State) else f"state {sample.state}"
     if sample.state != State.FAULT:
         return state

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS, *, clear: bool = False) -> Backend:
-    """Find the backend that `rig.backend.kind` names and make it; enter it to open the device.
+    """Return the backend that `rig.backend.kind` names; enter it to open the device.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS, *, clear: b
 
 
 def _told(backend: Any, *, clear: bool) -> Any:
-    """Tell a backend with the flag `clear`, whose device keeps faults, whether they are cleared."""
+    """Return the backend, with its flag `clear` set if it has one."""
     if isinstance(getattr(backend, "clear", None), bool):
         backend.clear = clear
     return backend
@@ -68,7 +68,7 @@ def _allowed(factory: Callable[..., Any], rig: Rig, clock: Clock) -> Callable[..
 
 
 def _refuse_simulation_only(rig: Rig, clock: Clock) -> None:
-    """Keep from a real device what only a simulation survives."""
+    """Raise if a real device would get settings that only a simulation may have."""
     if isinstance(clock, SimulatedClock):
         raise ConfigError(
             f'fast: backend.kind = "{rig.backend.kind}" runs in real time; virtual time needs a simulated '

@@ -91,7 +91,7 @@ class Handshake:
         self._booted_ns = 0  # the latest that a board has booted
 
     def run(self) -> Greeting:
-        """Go through all of it; afterwards the device is in RUN and hears 0 V.
+        """Run the whole handshake; afterwards the device is in RUN and receives 0 V.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class Handshake:
             self._introduce()  # that may have cost the session
 
     def _check_alone(self) -> None:
-        """Look for a second device of the same node; longer where the ticks are odd."""
+        """Raise if a second device has the same node number; listen longer if the ticks are odd."""
         ticks = self._caller.ticks
         if ticks.suspicious:
             self._caller.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._terms.period_us))
@@ -288,7 +288,7 @@ class Handshake:
 
 
 def _about(cleared: str) -> tuple[str, ...]:
-    """Name the fault of an earlier run that was cleared."""
+    """Return a remark on the fault of an earlier run that was cleared."""
     if not cleared:
         return ()
     meaning = meaning_of(Fault[cleared]) if cleared in Fault.__members__ else meaning_of(Fault.UNKNOWN)

@@ -1,4 +1,4 @@
-"""What is counted of a link while a device runs on it."""
+"""Counters of a link during a run."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class LinkMeter:
         counts.limited += report.limited
 
     def heard(self, tick: int, now_ns: int) -> None:
-        """Take the tick of the SAMPLE that is about to be answered, and when it was fetched, ns."""
+        """Note the tick of the SAMPLE that will be answered, and the instant of its receipt, ns."""
         gone_ns = now_ns - self._heard_ns - (tick - self._tick) * self._period_ns
         self.counts.late += gone_ns > self._late_ns
         self._heard_ns, self._tick = now_ns, tick
         self._clock.add(tick, now_ns)
 
     def answered(self, now_ns: int) -> None:
-        """Take when the command went out, ns: one that took a period comes too late."""
+        """Note the instant of the command, ns: one that took a period is too late."""
         self.counts.late += now_ns - self._heard_ns > self._late_ns
 
     def take_health(self, health: Health | None) -> None:

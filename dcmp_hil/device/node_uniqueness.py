@@ -26,7 +26,7 @@ class TickWatch:
         self._odd: deque[bool] = deque(maxlen=_KEPT_TICKS)
 
     def add(self, sample: SampleReport) -> None:
-        """Take the next SAMPLE of the node."""
+        """Add the next SAMPLE of the node."""
         last, self._last = self._last, sample
         if last is not None:
             step = nearest(0, sample.tick - last.tick, 8)

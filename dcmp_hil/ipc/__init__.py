@@ -1,1 +1,1 @@
-"""What processes of one run share: memory without a name, ring, mailbox, answers of a child process."""
+"""Communication of a run's processes: memory without a name, ring, mailbox, child process."""

@@ -59,7 +59,7 @@ def end_process(process: subprocess.Popen[bytes], within: float) -> int:
 
 
 def how_it_ended(code: int) -> str:
-    """Say how a process ended."""
+    """Return in words how a process ended."""
     if code == 0:
         return "left"
     return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"failed (exit code {code})"

@@ -103,7 +103,7 @@ class Mailbox:
         self.ring_bell()
 
     def ring_bell(self) -> None:
-        """Have the loop look at everything else."""
+        """Make the loop read the rest of the mailbox."""
         self.words[BELL] += 1
 
     @property
@@ -113,11 +113,11 @@ class Mailbox:
 
     @property
     def end(self) -> int:
-        """How the run ended, such as `AT_ZERO`; `LIVES` while it has not."""
+        """Code of the run's end, such as `AT_ZERO`; `LIVES` during the run."""
         return self.words[WORD]
 
     def tell_taken(self) -> None:
-        """Say that the run knows that it is to end."""
+        """Note that the run has received the request to end."""
         self.words[_STOP_TAKEN] = 1
 
     @property
@@ -126,7 +126,7 @@ class Mailbox:
         return self.words[WORD] in SAID
 
     def tell_forced(self) -> None:
-        """Say that signals are sent; a run that ends in order all the same says so later."""
+        """Note that signals are sent; a run that still ends in order notes that later."""
         if not self.ended:
             self.words[WORD] = FORCED
 
@@ -142,12 +142,12 @@ class Mailbox:
 
     @property
     def phase(self) -> int:
-        """Where the run stands, as a place in the list of phases."""
+        """Phase of the run, as an index in the list of phases."""
         return self.words[_PHASE]
 
     @property
     def last_words(self) -> str:
-        """How the run ended; empty while it has not."""
+        """Sentence on the run's end; empty during the run."""
         return bytes(self.memory[_END_TEXT_AT : _END_TEXT_AT + self.words[_END_TEXT_LENGTH]]).decode(
             "utf-8", "replace"
         )
@@ -181,15 +181,15 @@ class Mailbox:
 
     @property
     def handlers_asked(self) -> int:
-        """How often the signal handlers were asked for."""
+        """Number of requests to restore the signal handlers."""
         return self.words[_HANDLERS]
 
     def tell_phase(self, phase: int) -> None:
-        """Say where the run stands."""
+        """Write the phase of the run."""
         self.words[_PHASE] = phase
 
     def tell_end(self, sentence: str, end: int = UNCONFIRMED) -> None:
-        """Say how the run ended: in words, and as a number such as `AT_ZERO`."""
+        """Write how the run ended: in words, and as a code such as `AT_ZERO`."""
         data = readable(sentence).encode()[: _SLOT_AT - _END_TEXT_AT]
         self.memory[_END_TEXT_AT : _END_TEXT_AT + len(data)] = data
         self.words[_END_TEXT_LENGTH] = len(data)

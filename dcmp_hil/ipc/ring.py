@@ -101,7 +101,7 @@ class Ring:
         return self.written - self.position
 
     def drain(self) -> NDArray[np.float64]:
-        """Take every row waiting, oldest first.
+        """Return every row that waits, oldest first, and remove it.
 
         Returns
         -------

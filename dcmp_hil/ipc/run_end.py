@@ -1,4 +1,4 @@
-"""How a run ended: one number in memory that its processes share, and that outlives the run's own."""
+"""End of a run: a number in memory that its processes share, and that outlives the loop's process."""
 
 from __future__ import annotations
 

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 class Control(Protocol):
-    """Who may change a run: what a session asks of it."""
+    """Protocol of a process through which clients change a run."""
 
     @property
     def mailbox(self) -> Mailbox:
-        """Where changes come from."""
+        """Mailbox that contains the requested changes."""
         ...
 
     @property

@@ -112,7 +112,7 @@ class LiveChanges:
         self._notify(event)
 
     def warn(self, sentence: str) -> None:
-        """Have the loop tell of something; called from another thread."""
+        """Ask the loop to report a warning; called from another thread."""
         self._news.append(sentence)
         self._seen = _EVERY_CYCLE
 
@@ -134,7 +134,7 @@ class LiveChanges:
             self._notify(Event(t, "WARN", EventKind.CONTROL, self._news.popleft()))
 
     def _keep_handlers(self, t: float) -> None:
-        """Put the signal handlers in again; tell once that something else was there."""
+        """Restore the signal handlers; report once that others were set."""
         self._stop.reinstall()
         if self._stop.refused and not self._refused:
             self._refused = True

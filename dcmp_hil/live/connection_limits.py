@@ -29,7 +29,7 @@ class Crowd:
         self._here: dict[asyncio.StreamWriter, None] = {}
 
     def admit(self, writer: asyncio.StreamWriter) -> None:
-        """Take one more; close the oldest where there are too many."""
+        """Admit a connection; close the oldest if there are too many."""
         if len(self._here) >= MANY:
             oldest = next(iter(self._here))
             self.forget(oldest)

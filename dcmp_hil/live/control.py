@@ -151,7 +151,7 @@ class Server:
         return os.getppid() == self._parent
 
     def stop(self, by: int = STOP) -> asyncio.Task[Stopped]:
-        """Have the run end, once; it is forced to where it does not answer."""
+        """End the run once, by force if it does not answer."""
         if self._stopping is None:
             self._stopping = asyncio.ensure_future(asyncio.to_thread(self._stop, by))
         return self._stopping
@@ -250,7 +250,7 @@ class _Watch:
         await self._server.say_goodbye()
 
     def _take(self) -> None:
-        """Take the numbers of signals that the run was sent."""
+        """Read the numbers of the signals that the run received."""
         try:
             numbers = self._line.recv(_SIGNALS_BYTES_MAX)
         except BlockingIOError:

@@ -119,7 +119,7 @@ class ControlProcess:
                 return
 
     def close(self, last_words: str, *, confirmed: bool) -> None:
-        """Say how the run ended, and have it leave."""
+        """Report the end of the run to the process, and wait for its end."""
         self._closing = True
         self.mailbox.tell_end(last_words, AT_ZERO if confirmed else UNCONFIRMED)
         if self._line is not None:

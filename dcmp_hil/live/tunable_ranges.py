@@ -1,4 +1,4 @@
-"""What can be turned: every settable key with its value, its unit, what is allowed, and a slider's range."""
+"""Every settable key with its value, unit, allowed values and slider range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may change in a run: gains and reference, checked by the rules of rig.toml; no limit ever."""
+"""Keys that may change in a run: gains and reference, checked by the rules of rig.toml; never a limit."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
 
 
 def doubts(before: Rig, after: Rig) -> list[str]:
-    """Name what a change makes questionable, in the words that `run` has for it."""
+    """Return the warnings that a change causes, in the words of `run`."""
     known = warnings(before)
     return [sentence for sentence in warnings(after) if sentence not in known]
 

@@ -1,4 +1,4 @@
-"""What stands in a cell of a recording: a number, a time of day, or neither."""
+"""Content of a cell of a recording: a number, a time of day, or neither."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Columns(NamedTuple):
 
 
 def choose(table: Table, options: ColumnOptions) -> Columns:
-    """Find the columns.
+    """Return the columns that are used.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def _time(table: Table, options: ColumnOptions) -> tuple[Match | None, Match | N
 
 
 def _unnamed_time(table: Table) -> Match | None:
-    """Take a first column without a name as the time, as pandas writes an index of times."""
+    """Return a first column without a name as the time, as pandas writes an index of times."""
     if table.header[0] != "1" or not table.named:
         return None
     cells = table.column("1")
@@ -121,7 +121,7 @@ def _unnamed_time(table: Table) -> Match | None:
 def _two_columns(
     table: Table, options: ColumnOptions, first: str, second: str
 ) -> tuple[Match | None, Match | None]:
-    """Take two columns of time together, or, where both are the whole time, the finer one."""
+    """Return two columns that form the time together, or the finer one if both are the whole time."""
     if _is_pair(table, first, second):
         return _pair(table, first, second, options.time_unit)
     if options.time is not None:
@@ -176,7 +176,7 @@ def _input(table: Table, options: ColumnOptions) -> Match | None:
 
 
 def _velocity(table: Table, options: ColumnOptions, notes: list[str]) -> Match | None:
-    """Find a velocity, which nothing depends on: where it is in doubt it is left out."""
+    """Return the column of velocity; None if it is in doubt, since it is optional."""
     if options.velocity is not None:
         if options.velocity.lower() == NONE and NONE not in table.header:
             return None

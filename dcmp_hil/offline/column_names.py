@@ -127,7 +127,7 @@ def match(
     unit: str | None,
     units: Sequence[str] = (),
 ) -> Match | None:
-    """Find the column of a quantity.
+    """Return the column of a quantity; None if there is none.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
 
 
 def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
-    """How likely it is, the smallest first; None for a column of something else."""
+    """Return the rank of a column, the likeliest smallest; None for another quantity."""
     words, unit = _parts(quantity, name)
     if " ".join(words) in _WHOLE:
         return (1, 99) if _WHOLE[" ".join(words)] == quantity else None
@@ -260,7 +260,7 @@ def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
 
 
 def _without_number(quantity: Quantity, word: str) -> str:
-    """Take the number of a joint off a word, as in `position0`."""
+    """Return a word without the number of a joint, as in `position0`."""
     bare = word.rstrip("0123456789")
     return bare if len(bare) > 2 and bare in _NAMES[quantity] else word  # noqa: PLR2004 - x1 is a name
 

@@ -120,7 +120,7 @@ def _decode(raw: bytes) -> tuple[str, str]:
 
 
 def _wide(head: bytes) -> str | None:
-    """Tell UTF-16 without a mark: every other byte of plain text is 0."""
+    """Return the kind of UTF-16 without a mark: every other byte of plain text is 0."""
     if len(head) < 4:  # noqa: PLR2004 - two characters
         return None
     for encoding, side, other in (("utf-16-le", 1, 0), ("utf-16-be", 0, 1)):

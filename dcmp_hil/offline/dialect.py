@@ -1,4 +1,4 @@
-"""How the fields of a text file are told apart: delimiter, decimal sign, and what a row is."""
+"""Dialect of a text file: delimiter, decimal sign, and form of a row."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LAYOUTS = [(delimiter, decimal) for decimal in (".", ",") for delimiter in (","
 
 
 class Layout(NamedTuple):
-    """How a row is written.
+    """Form of a row: delimiter and decimal sign.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def prepared(lines: Sequence[str]) -> tuple[list[tuple[int, str]], str]:
 
 
 def _unstamped(text: str) -> str:
-    """Take off the time at which a serial monitor received a line: the device's own clock is better."""
+    """Return a line without the time stamp of a serial monitor: the device's own clock is better."""
     return _MONITOR.sub("", text, count=1)
 
 

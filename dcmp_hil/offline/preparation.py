@@ -1,4 +1,4 @@
-"""What a replay needs before its first row: the observer, the rig it believes in, the input it is fed."""
+"""Preparation of a replay: its observer, the rig's model, and the input."""
 
 from __future__ import annotations
 

@@ -243,7 +243,7 @@ def _position(
 
 
 def _guessed(column: Match, raw: Column, options: ColumnOptions) -> tuple[Match, tuple[str, ...]]:
-    """Tell the unit of a position whose name has none, by its values: rad unless it cannot be."""
+    """Return the unit of a position without one in its name, by its values: rad if possible."""
     if len(raw) and (raw == np.round(raw)).all() and np.ptp(raw) > _WHOLE_RADIANS:
         if options.counts_per_rev is None:
             raise ConfigError(

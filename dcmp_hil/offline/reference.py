@@ -99,7 +99,7 @@ def zero_phase(
 
 
 def _even(time: NDArray[np.float64], period: float) -> NDArray[np.float64]:
-    """Lay an even grid whose first and last points are the first and last rows."""
+    """Return an even grid from the first to the last row."""
     return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
 
 

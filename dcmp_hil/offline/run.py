@@ -30,7 +30,7 @@ _ESTIMATE_MAX = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayResult:
-    """What the observer made of a recording; arrays have one value a row.
+    """Result of a replay; arrays have one value a row.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a replay may be told: the observer's parameters, the inertia, and how the figures are judged."""
+"""Options of a replay: the observer's parameters, the inertia, and the judgement of the figures."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ def _said(before: Sequence[Line], left_out: Sequence[Line], repeated: int) -> It
 
 
 def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str], list[Line]]:
-    """Find the header in the lines above the first row: names, units, and what is neither."""
+    """Return names, units and other lines above the first row."""
     units: list[str] = []
     nearest: tuple[int, list[str]] | None = None
     for place in range(len(above) - 1, -1, -1):
@@ -221,7 +221,7 @@ def _torn(rows: list[list[str]], source: Lines, decimal: str) -> bool:
 def _aligned(
     header: list[str], units: list[str], rows: list[list[str]], layout: Layout
 ) -> tuple[list[str], list[list[str]], list[str]]:
-    """Give every column a name and a unit."""
+    """Return a name and a unit for every column."""
     width = layout.width
     first, last = rows[0], layout.width - 1
     labels = [label_in(cell) or "" for cell in first]

@@ -132,7 +132,7 @@ def _starts(raw: Column, size: float, usual: float, notes: list[str]) -> list[in
 
 
 def _joined(parts: list[Column], begin: float) -> Column:
-    """Put stretches one behind the other, a usual step apart."""
+    """Return the stretches joined, a usual step apart."""
     typical = float(np.median(np.concatenate([np.diff(part) for part in parts])))
     time = [begin + parts[0]]
     for part in parts[1:]:

@@ -69,7 +69,7 @@ _UNITS: dict[Quantity, dict[str, tuple[str, float]]] = {
 
 
 def find_unit(quantity: Quantity, spelling: str) -> tuple[str, float] | None:
-    """Look a unit up.
+    """Return the unit with this name, and its factor; None if unknown.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def any_unit(spelling: str) -> bool:
 
 
 def known_unit(quantity: Quantity, spelling: str) -> tuple[str, float]:
-    """Look a unit up that an option names; the result is as for `find_unit`.
+    """Return the unit that an option names, as for `find_unit`.
 
     Raises
     ------

@@ -77,13 +77,13 @@ class Door:
         return Visit(self)
 
     def admit(self, visit: Visit) -> None:
-        """Take a new connection; the oldest one without a request goes where there are too many."""
+        """Admit a new connection; close the oldest one without a request if there are too many."""
         if len(self._waiting) >= WAITING:
             next(iter(self._waiting)).drop()
         self._waiting[visit] = None
 
     def refusal(self, visit: Visit, head: Head, request: bytes) -> int:
-        """Let a whole request in; return the status with which it is refused, 0 if it is not."""
+        """Return the status with which a complete request is refused; 0 if it is admitted."""
         known = self._token in request
         if known and head.method == b"POST" and head.target == _STOP_PATH:
             visit.is_stop = True
@@ -105,7 +105,7 @@ class Door:
 
 
 class Visit(asyncio.Protocol):
-    """One connection: collects a request, has it answered, and closes.
+    """A connection: collects a request, passes it on, and closes after the answer.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ class _OnceEach(logging.Filter):
         self._seen: set[str] = set()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Tell whether a line is the first of its kind; its traceback is left out."""
+        """Return whether a line is the first of its kind; its traceback is left out."""
         error = record.exc_info[0] if record.exc_info else None
         kind = f"{record.name} {record.msg[:80] if isinstance(record.msg, str) else ''} {error}"
         if kind in self._seen or len(self._seen) >= _LINE_KINDS_MAX:

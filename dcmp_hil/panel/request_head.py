@@ -1,4 +1,4 @@
-"""What a request begins with, looked at as bytes before any library parses it: everything odd is refused."""
+"""Head of a request, checked as bytes before any library parses it: malformed requests are refused."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ def _now_ms() -> float:
 
 
 def _keep_more_waiting(listening: socket.socket) -> None:
-    """Have the kernel keep more connections than are taken from it at once."""
+    """Enlarge the kernel's queue of connections."""
     again = socket.fromfd(listening.fileno(), socket.AF_INET, socket.SOCK_STREAM)
     with again:
         again.listen(_ACCEPT_QUEUE_MAX)

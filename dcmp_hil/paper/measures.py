@@ -1,4 +1,4 @@
-"""What the paper's figures show, as numbers taken from one run."""
+"""Figures of the paper, as numbers from one run."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Measures:
 
 
 def measure(result: Result) -> Measures:
-    """Take the figures of a run against the truth.
+    """Return the figures of a run, compared with the truth.
 
     Parameters
     ----------

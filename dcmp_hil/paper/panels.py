@@ -1,4 +1,4 @@
-"""What figures 1 to 4 of the paper show: panels, lines and the series behind them."""
+"""Contents of figures 1 to 4 of the paper: panels, lines and series."""
 
 from __future__ import annotations
 

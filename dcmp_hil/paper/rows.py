@@ -122,7 +122,7 @@ PRINTED = (
 
 
 def rows(corrected: Measures, eq9: Measures, eq10: Measures) -> tuple[Row, ...]:
-    """Lay three runs out against what is expected of them."""
+    """Return the table of three runs and the expected values."""
     return tuple(
         Row(
             quantity=expected.quantity,
@@ -138,7 +138,7 @@ def rows(corrected: Measures, eq9: Measures, eq10: Measures) -> tuple[Row, ...]:
 
 
 def misprints(corrected: Measures, variants: dict[str, Measures]) -> tuple[Misprint, ...]:
-    """Lay the runs of `PRINTED`, by their variant, out beside the corrected one."""
+    """Return the table of the runs of `PRINTED`, by variant, beside the corrected run."""
     return tuple(
         Misprint(
             equation=one.equation,

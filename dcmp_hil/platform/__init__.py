@@ -1,1 +1,1 @@
-"""What is asked of the operating system: time, real-time scheduling, signals, descriptors, folders."""
+"""Access to the operating system: time, real-time scheduling, signals, descriptors, folders."""

@@ -1,4 +1,4 @@
-"""How much room there is on the disk of a file, and how much of it belongs to the run's data."""
+"""Free space on the disk of a file, and the part reserved for the run's data."""
 
 from __future__ import annotations
 

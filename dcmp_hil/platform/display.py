@@ -21,12 +21,12 @@ _KINDS = (  # in the order in which the viewer takes them
 
 
 def display_available() -> bool:
-    """Tell whether an X or Wayland display is announced in the environment."""
+    """Return whether the environment names an X or Wayland display."""
     return any(os.environ.get(name) for name, _, _ in _KINDS)
 
 
 def display_problem() -> str:
-    """Say why no window could be shown; empty where one can.
+    """Return why no window can be shown; empty if one can.
 
     The display is opened as the viewer does it, with the system's own library and the user's cookie, in a
     process of its own: a library that ends its process, or a display that is frozen, costs nothing else.

@@ -7,6 +7,6 @@ from contextlib import suppress
 
 
 def trim() -> None:
-    """Give the heap's free pages back to the system, where its C library can."""
+    """Return the heap's free pages to the system, if its C library can."""
     with suppress(OSError, AttributeError):  # not glibc
         ctypes.CDLL(None).malloc_trim(0)

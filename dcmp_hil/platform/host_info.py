@@ -1,4 +1,4 @@
-"""What kind of computer a run was on: facts of the operating system that decide how late a loop can be."""
+"""Facts about the computer of a run that determine how late a loop can be."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def in_words(facts: dict[str, Any]) -> str:
 
 
 def contention(loadavg: str = _LOADAVG, cpus: int | None = None) -> str:
-    """Say how many threads want the processors now, where they are more than there are processors.
+    """Return a sentence on the number of ready threads, if it exceeds the number of processors.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def capabilities(status: str) -> int:
 
 
 def preemption(version: str, model: str | None) -> str:
-    """Name the preemption model of a kernel.
+    """Return the preemption model of a kernel.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a forked process must not hold: ports and lines of this process, which would outlive it there.
+"""Descriptors that a forked process must not hold: ports and lines, which would outlive this process.
 
 A class of the user's own may fork (`multiprocessing` does so on Linux). The copy has every descriptor: the
 lock of the serial port, the line whose end tells other processes that this one has gone.

@@ -23,7 +23,7 @@ _terminal: int | None = None
 
 
 def use_terminal(descriptor: int) -> None:
-    """Take `descriptor` for the run's own lines, in a process whose descriptor 2 is a log."""
+    """Use `descriptor` for the run's own lines, in a process whose descriptor 2 is a log."""
     global _terminal  # noqa: PLW0603 - of this process, like sys.stderr
     _terminal = descriptor
 

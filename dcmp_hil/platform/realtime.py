@@ -117,7 +117,7 @@ class RealTime:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give everything back; what cannot be given back never hides how the run ended."""
+        """Undo every setting; an error here never hides how the run ended."""
         with suppress(OSError):
             self._undo.close()
 
@@ -187,7 +187,7 @@ def _switch_sooner(timing: TimingSection, undo: ExitStack) -> None:
 
 
 def _sharpen_timer(timing: TimingSection, undo: ExitStack) -> None:  # noqa: ARG001
-    """Let a sleep of a normal thread end on time, not 50 us later; SCHED_FIFO has that anyway."""
+    """Set the timer slack so that a normal thread wakes on time, not 50 us later, as with SCHED_FIFO."""
     _call_libc("prctl", _TIMER_SLACK, 1, 0, 0, 0)
     undo.callback(_call_libc, "prctl", _TIMER_SLACK, _USUAL_SLACK, 0, 0, 0)
 

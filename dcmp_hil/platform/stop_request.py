@@ -1,4 +1,4 @@
-"""How a run ends from outside: Ctrl-C, signals and STOP become a request that the loop sees once a period.
+"""External end of a run: Ctrl-C, signals and STOP become a request that the loop reads once a cycle.
 
 A class of the user's own runs in the same process and may set signal handlers too, as libraries do. While
 a run goes on its signals are the run's: `signal.signal` leaves these three alone, and `reinstall` puts back
@@ -93,7 +93,7 @@ class StopRequest:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Put the handlers of before back, when the outermost leaves."""
+        """Restore the earlier handlers when the outermost context ends."""
         self._entered -= 1
         if not self._entered:
             self._give_back()
@@ -105,13 +105,13 @@ class StopRequest:
             self._woken_before = signal.set_wakeup_fd(descriptor, warn_on_full_buffer=False)
 
     def wake_no_more(self) -> None:
-        """Have nothing written any more."""
+        """Stop writing signal numbers to the descriptor."""
         if self._woken != -1:
             self._woken = -1
             signal.set_wakeup_fd(self._woken_before)
 
     def reinstall(self) -> None:
-        """Put the handlers in again where something else is there, and let the signals through."""
+        """Restore the handlers where others are set, and unblock the signals."""
         if not self._before:
             return
         for number in SIGNALS:
@@ -125,7 +125,7 @@ class StopRequest:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Let a second SIGINT interrupt nothing for a moment: what is written meanwhile is written wholly."""
+        """Hold back a second SIGINT, so that files that are being written become complete."""
         before, self._held = self._held, True
         try:
             yield
@@ -143,7 +143,7 @@ class StopRequest:
         self.ask(number)
 
     def _leave_alone(self, number: int, handler: Any) -> Any:
-        """Take the place of `signal.signal`: other signals are set, and these are noted only."""
+        """Replace `signal.signal`: set handlers of other signals, and only note those of these."""
         if number not in SIGNALS:
             return self._set(number, handler)
         known = signal.Signals(number)
@@ -163,7 +163,7 @@ class StopRequest:
         _handlers.discard(self)
 
     def _forget_in_fork(self) -> None:
-        """Be none of a forked process: what ends it is not the end of this run."""
+        """Reset the request in a forked process, whose end is not that of this run."""
         self._woken_before = -1
         self._give_back()
 

@@ -117,14 +117,14 @@ def split_named(path: str, key: str, known: Iterable[str] = ()) -> tuple[str, st
 
 
 def no_such_class(said: str, module: str, name: str, names: Iterable[str]) -> str:
-    """Say that a module has no such class, and which it may be."""
+    """Return the error that a module has no such class, with similar names."""
     close = get_close_matches(name, [other for other in names if not other.startswith("_")], n=1)
     hint = f" Did you mean {close[0]}?" if close else ""
     return f"{said}, but {module} has no class {name}.{hint}"
 
 
 def not_found(said: str, module: str, folders: Sequence[Path], error: ImportError | None = None) -> str:
-    """Say that there is no such module, and where it was looked for."""
+    """Return the error that there is no such module, with the places that were searched."""
     sentence = f"{said}, but importing {module} failed: {error or f'No module named {module!r}'}."
     if not folders:
         return f"{sentence} Install the package."
@@ -157,7 +157,7 @@ def _failed(error: BaseException, module: str, place: Place | None) -> str:
 
 
 def _missing(error: ModuleNotFoundError, place: Place | None) -> str:
-    """Say what helps where a module of the user's own imports one that is not found."""
+    """Return a remedy if a user's module imports one that is not found."""
     wanted = (error.name or "").partition(".")[0]
     if place is None or place.installed or not wanted:
         return "Install the package."

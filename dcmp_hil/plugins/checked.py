@@ -65,7 +65,7 @@ class CheckedObserver:
         return self._failure
 
     def _converted(self, estimate: Any, t: float) -> Estimate:
-        """Take numbers that are no plain floats, such as numpy's; say what else it is."""
+        """Return an estimate of plain floats, also from numpy's; note a failure for other types."""
         expected = "Estimate(position, velocity, disturbance), three numbers"
         if isinstance(estimate, Estimate):
             numbers = [number for value in estimate if (number := plain_number(value)) is not None]

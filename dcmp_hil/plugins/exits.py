@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class ProcessExit(SystemExit):
-    """What `os._exit` and `os.abort` raise where a run goes on: the process would end without a word."""
+    """Exception that `os._exit` and `os.abort` raise during a run, which they would end without a report."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Where the module of a `module:Class` lies: installed, or else beside the rig file or in the current folder.
+"""Search for the module of a `module:Class`: installed, beside the rig file, or in the current folder.
 
 Nothing is run here: a package is looked into as files, its `__init__` is not imported.
 """
@@ -26,7 +26,7 @@ _PACKAGES = ("dcmp_hil", "sim_backend")  # they run already: a checkout in the c
 
 
 class Place(NamedTuple):
-    """Where a module is.
+    """Location of a module.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Place(NamedTuple):
 
 
 def locate(module: str, folders: Sequence[Path], said: str) -> Place | None:
-    """Find a module without importing anything.
+    """Return the location of a module, without importing anything; None if it is not found.
 
     Parameters
     ----------

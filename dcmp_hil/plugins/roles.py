@@ -1,4 +1,4 @@
-"""What a class may be named for in rig.toml, and what it must have."""
+"""Roles of a user's class in rig.toml, and its required methods."""
 
 from __future__ import annotations
 

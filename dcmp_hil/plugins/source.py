@@ -23,7 +23,7 @@ _SOURCE = (".py", ".pyw")
 
 
 def look_at(path: str, role: Role, folders: Sequence[Path], options: Collection[str] = ()) -> None:
-    """Look whether a class is there, without importing its module.
+    """Check that a class exists, without importing its module.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _fault_of_class(statement: ast.ClassDef, role: Role, options: Collection[str
 
 
 def _refusal(arguments: ast.arguments, role: Role, options: Collection[str], *, bound: int) -> str:
-    """Say why a call with the arguments of the role would not fit; empty if it would."""
+    """Return why a call with the arguments of the role would fail; empty if it would not."""
     try:
         _signature(arguments).bind(*[None] * (bound + role.arguments), **dict.fromkeys(options))
     except (TypeError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""What went wrong in a class of the user's own: one line, with file and line number."""
+"""Errors of a user's class: one line, with file and line number."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Backlog:
         self.refused = ""
 
     def write(self, data: bytes) -> int:
-        """Take bytes of a piece that is being made."""
+        """Add bytes of the present piece."""
         self._made += data
         self._told += len(data)
         return len(data)

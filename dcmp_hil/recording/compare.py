@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Line(NamedTuple):
-    """One figure of both; None where it is not known."""
+    """A figure of both runs; None if it is not known."""
 
     name: str  # with its unit
     recorded: float | None

@@ -1,4 +1,4 @@
-"""What the end of a recording says of it, without reading the rest: whether a run that has ended is in it."""
+"""Check of a recording's end, without reading the rest: whether it is complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the recording of another user may not do: have code imported, files read, or hold false numbers."""
+"""Restrictions for the recording of another user: no imports, no files, no impossible numbers."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def refuse_named(recorded: RecordedRun, rig: Rig) -> None:
 
 
 def check_numbers(recorded: RecordedRun) -> None:
-    """Look whether time rises and every fault is a code: no loop ever saw anything else.
+    """Check that time rises and that every fault is a code.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is in a block of a recording: periods as rows of numbers, events, and who they say they are."""
+"""Contents of a block of a recording: cycles as rows of numbers, events, and their identity."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Messages:
         return next((number for number, name in self._topics.items() if name == topic), 0)
 
     def take(self, data: bytes) -> None:
-        """Take the records in a block."""
+        """Process the records in a block."""
         at, end = 0, len(data)
         while at < end:
             if end - at < HEAD.size:
@@ -99,7 +99,7 @@ class Messages:
             at = start + length
 
     def _periods(self, data: bytes, at: int) -> int:
-        """Take the periods that follow one another from `at`; return how many there are."""
+        """Process the consecutive cycles from `at`; return their number."""
         found = np.frombuffer(data, _PERIOD, (len(data) - at) // _PERIOD.itemsize, at)
         same = (
             (found["opcode"] == Op.MESSAGE)

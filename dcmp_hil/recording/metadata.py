@@ -1,4 +1,4 @@
-"""What a recording says about its run, beside the rig: versions, computer, checkout."""
+"""Metadata of a recording: versions, computer, checkout."""
 
 from __future__ import annotations
 

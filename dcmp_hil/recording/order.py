@@ -73,7 +73,7 @@ def in_order(
     events: int | None,
     event_of: Callable[[Mapping[str, Any]], Event],
 ) -> Ordered:
-    """Put periods and events in the order of their numbers.
+    """Return cycles and events in the order of their numbers.
 
     Parameters
     ----------

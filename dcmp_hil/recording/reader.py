@@ -201,7 +201,7 @@ class _Found:
         self._counts: dict[int, int] | None = None
 
     def take(self, record: Record, *, summary_checked: bool) -> None:
-        """Take a record, in the order of the file; say with the footer whether its summary was checked."""
+        """Process a record, in the order of the file; the footer says whether its summary was checked."""
         try:
             if record.opcode == Op.CHUNK:
                 self.messages.take(record.content)

@@ -1,4 +1,4 @@
-"""One record of an MCAP file, checked: its checksum, its lengths, and the bounds of this module.
+"""Reading of single MCAP records, with checks of checksum, lengths and bounds.
 
 https://mcap.dev/spec. The library's reader checks no attachment and stops at the first fault: decision 16.
 """

@@ -35,7 +35,7 @@ _AT = {name: place for place, name in enumerate(FIELDS)}
 
 @dataclass(frozen=True)
 class Again:
-    """What observer and controller say to the samples of a run.
+    """Estimates and demands of observer and controller for the samples of a run.
 
     Parameters
     ----------

@@ -179,7 +179,7 @@ class Scanner:
         return content
 
     def _sum_up(self, opcode: int, head: bytes, content: bytes) -> None:
-        """Go on with the checksum of the section, and look at it where the section ends."""
+        """Update the checksum of the section, and compare it at the section's end."""
         if opcode == Op.DATA_END:
             said = data_end_in(content)
             self.data_checked = said == self._crc if said and self._in_one_piece else None
@@ -206,7 +206,7 @@ class Scanner:
         return self._size
 
     def _trusted(self, start: int) -> bool:
-        """Look at a record in search of one; what that costs is counted."""
+        """Return whether a valid record begins at `start`; count the cost of the search."""
         room = self._room
         try:
             self._searched += self._record(start).end - start

@@ -1,4 +1,4 @@
-"""What a recording looks like inside: topics, schemas, and a period as bytes that ROS tools read as well."""
+"""Format of a recording: topics, schemas, and the bytes of a cycle, which ROS tools read as well."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ class Recording:
             )
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         times = block["t"]
         at_ns = log_times(times, self._began_ns).tolist()
         for t, data, at in zip(times.tolist(), to_bytes(block.rows), at_ns, strict=True):
@@ -136,7 +136,7 @@ class Recording:
         self._put()
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         at = int(log_times(np.array([event.t]), self._began_ns)[0])
         self._event += 1
         self._writer.add_message(self._events, at, event_to_bytes(event, at), at, self._event)
@@ -206,7 +206,7 @@ class Recording:
             self.warnings.append(f"{self._path} goes on, and nothing is missing.")
 
     def _tell_dropped(self) -> bool:
-        """Tell what was dropped since the last time; return whether there was any."""
+        """Report blocks dropped since the last call; return whether there were any."""
         new = _joined([_span(piece) for piece in self._file.dropped[self._dropped_told :]])
         self._dropped_told = len(self._file.dropped)
         for start, stop, periods in new:

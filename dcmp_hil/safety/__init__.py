@@ -1,1 +1,1 @@
-"""What keeps arm and motor safe on the host's side: the supervisor, its monitors, and the limits."""
+"""Safety functions of the host: the supervisor, its monitors, and the limits."""

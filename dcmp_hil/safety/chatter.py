@@ -64,11 +64,11 @@ class Chatter:
         self.expect(expected)
 
     def expect(self, variation: float) -> None:
-        """Take what other gains make of the expected variation, V/s."""
+        """Set the expected variation after a change of gains, V/s."""
         self._expected, self._limit = variation, limit_V_s(variation)
 
     def judge(self, t: float, change: float) -> Stop | None:
-        """Take the sum of |dV| of a block (V) that ends at device time `t`, s; object to chatter.
+        """Judge the sum of |dV| of a block (V) that ends at device time `t`, s; return a Stop for chatter.
 
         That is half a second with a mean from the limit on and no pause in it; or bursts, for longer.
         """
@@ -118,7 +118,7 @@ _SWING = (
 
 
 def cause_of(samples: Collection[Sample], count: float) -> tuple[str, str]:
-    """Say what a chattering voltage looks like, and what to look at first.
+    """Return the likely cause of a chattering voltage, and a remedy.
 
     Parameters
     ----------

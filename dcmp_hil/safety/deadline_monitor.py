@@ -45,7 +45,7 @@ class Overruns:
         self._cold = round(_WARM_UP_S / period)  # periods to go
 
     def check(self, timing: Timing) -> Stop | None:
-        """Take the timing of one period; return why the run should end if too many were late."""
+        """Judge the timing of one cycle; return a Stop if too many were late."""
         _, lateness, compute = timing
         punctual = self._punctual + self._leak
         behind = lateness - punctual

@@ -1,4 +1,4 @@
-"""What a device's fault means, and what to look at first."""
+"""Meaning of a device's faults, and a remedy for each."""
 
 from __future__ import annotations
 

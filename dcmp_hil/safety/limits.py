@@ -39,7 +39,7 @@ class _Lasting:
 
 
 class Limits:
-    """What the line may ask for; a limit that acts for too long ends the run in an orderly way.
+    """Limits of reference and voltage; a limit that acts for too long ends the run by a ramp.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Limits:
         self._left = -1  # periods to its end, if it has one
 
     def watch_variation(self, chatter: Chatter) -> None:
-        """Have the variation of the voltage judged."""
+        """Begin to judge the variation of the voltage."""
         self._chatter, self._left = chatter, chatter.block
 
     def reference(self, sample: Sample, reference: Reference) -> Reference:
@@ -136,7 +136,7 @@ class Limits:
         self._change, self._left = 0.0, self._chatter.block
 
     def _judged(self, sample: Sample, asked: Reference, reference: Reference) -> Reference:
-        """Say what of a reference is limited; it is the governed one that the arm may not be off."""
+        """Report a limited reference; stop if the arm is too far from the governed one."""
         x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
             self._stop = Stop(

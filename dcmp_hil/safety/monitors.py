@@ -152,6 +152,6 @@ class DisturbanceWatch:
         )
 
     def _explanation(self, figures: str) -> Explanation:
-        """Find the likely cause, which takes longer than 0 V may wait."""
+        """Return the likely cause; finding it takes longer than 0 V may wait."""
         reason, sentence, remedy = self._diagnosis.finding()
         return Explanation(reason, f"{sentence}: {figures}", remedy)

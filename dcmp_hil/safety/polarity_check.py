@@ -59,7 +59,7 @@ class MotorGain(NamedTuple):
         }
 
     def told(self, t: float) -> Event:
-        """Say it; a warning where the model is further off than 1.25, by more than the fit's own doubt."""
+        """Return the event; a warning if the gain's ratio exceeds 1.25 by more than its uncertainty."""
         doubt = self.deviation / self.believed
         off = self.ratio - doubt > _GAIN_RATIO_WARNING or self.ratio + doubt < 1.0 / _GAIN_RATIO_WARNING
         said = (
@@ -130,7 +130,7 @@ class Probe:
         return 0.5 * self._ku * self._push * PUSH * PUSH > _PUSH_TRAVEL_MIN_COUNTS * self._count
 
     def check(self, sample: Sample) -> Stop | None:
-        """Take a sample; object if the rig is not what the file says.
+        """Judge a sample; return a Stop if the rig contradicts its file.
 
         Reasons are ``moving``, ``power``, ``slew``, ``polarity``, ``gain`` and ``not_finite``.
         """
@@ -226,7 +226,7 @@ class Probe:
         return None
 
     def _too_slow(self, reached: float) -> Stop:
-        """Find the fault with the amplifier: it put out too little for the arm to answer."""
+        """Return the Stop for an amplifier whose output was too low to move the arm."""
         return Stop(
             "slew",
             f"The amplifier put out {reached:.2g} V of the {self._push:g} V asked for in "

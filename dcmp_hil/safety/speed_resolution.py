@@ -1,4 +1,4 @@
-"""How finely a speed shows: one count of the encoder over the time that speed is taken over."""
+"""Resolution of the speed: one count of the encoder over the time of the measurement."""
 
 from __future__ import annotations
 

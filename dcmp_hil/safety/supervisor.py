@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Phase(StrEnum):
-    """Where a run stands."""
+    """Phases of a run."""
 
     ARMING = "arming"  # the backend has the device in RUN at 0 V; no sample yet
     PROBING = "probing"  # a volt up and down: which way does the arm go
@@ -120,7 +120,7 @@ class Supervisor:
 
     @property
     def motor_gain(self) -> MotorGain | None:
-        """What the probe found of the motor; None without one, and before it is over."""
+        """Result of the polarity check; None without one, and before its end."""
         return self._probe.found if self._probe else None
 
     def engages(self, sample: Sample) -> bool:

@@ -25,11 +25,11 @@ class Sink(Protocol):
     """Protocol of a receiver of blocks and events."""
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         ...
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         ...
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ class Audience:
             self._tell(lambda sink, event=event: sink.event(event))  # type: ignore[misc]
 
     def _report_warnings(self) -> None:
-        """Tell what a sink goes on without since the last time."""
+        """Report new warnings of a sink."""
         for sink in self._sinks:
             warnings = _warnings(sink)
             for sentence in warnings[self._warned[id(sink)] :]:

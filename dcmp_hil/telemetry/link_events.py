@@ -1,4 +1,4 @@
-"""What was lost and damaged between host and device, told once a second."""
+"""Events on lost and damaged frames between host and device, once a second."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class LinkWatch:
         self._before: LinkCounters | None = None
 
     def look(self, t: float) -> None:
-        """Take the device time of a period, s."""
+        """Report the counters if a second has passed at device time `t`, s."""
         self._left -= 1
         if not self._left:
             self._left = self._periods

@@ -23,11 +23,11 @@ class Keeper:
         self._pieces: list[dict[str, NDArray[np.float64]]] = []
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         self._pieces.append({name: column.copy() for name, column in columns(block).items()})
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         self.events.append(event)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""How the process of a run ended, as the telemetry process sees it: in order, by STOP, or without a word."""
+"""End of a run's process, as the telemetry process sees it: in order, by STOP, or without a report."""
 
 from __future__ import annotations
 

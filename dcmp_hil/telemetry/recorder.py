@@ -93,7 +93,7 @@ class Recorder:
                 self._audience.dispatch()
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         self._audience.event(event)
         if self._apart:
             self._apart.event(event)

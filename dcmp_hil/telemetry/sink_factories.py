@@ -34,7 +34,7 @@ class Deferred:
 
     @property
     def warnings(self) -> Sequence[str]:
-        """What the sink, or the run without it, goes on without."""
+        """Messages about parts that the sink or the run works without."""
         warnings: Sequence[str] = getattr(self._sink, "warnings", self._missing)
         return warnings
 
@@ -52,12 +52,12 @@ class Deferred:
             self._missing = (f"A sink could not be made, the run goes on without it: {error}",)
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         if self._sink:
             self._sink.block(block)
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         if self._sink:
             self._sink.event(event)
 

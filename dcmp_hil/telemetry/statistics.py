@@ -30,7 +30,7 @@ class Percentiles:
 
 @dataclass(frozen=True, slots=True)
 class Histogram:
-    """How many durations there were up to each bound and above the one before, to 1 %."""
+    """Histogram of durations, with a resolution of 1 %."""
 
     up_to_us: tuple[float, ...]
     """1, 2, 5, 10 ... us, as far as there is anything; what is above a second is infinite."""
@@ -77,7 +77,7 @@ class Error:
         self._n, self._squares, self._max = 0, 0.0, 0.0
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Take the next piece."""
+        """Add the next block."""
         known = values[~np.isnan(values)]
         if len(known):
             self._n += len(known)
@@ -108,7 +108,7 @@ class Durations:
         self._min, self._max = math.inf, -math.inf
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Take the next piece, s; NaN is left out."""
+        """Add the next block of durations, s; NaN is left out."""
         known = values[~np.isnan(values)]
         if not len(known):
             return
@@ -161,7 +161,7 @@ class Statistics:
         self._first_lateness = self._last_lateness = math.nan
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         t = block["t"]
         inside = np.flatnonzero((t >= self._from - 0.5 * self._period) & (t < self._to))
         if not len(inside):

@@ -1,4 +1,4 @@
-"""What a run comes to: its figures, and its columns and events where they are kept."""
+"""Figures of a run, and its columns and events if they are kept."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class Figures:
         self.troubles: list[str] = []
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         self.statistics.block(block)
         if self.keeper:
             self.keeper.block(block)
 
     def event(self, event: Event) -> None:
-        """Take an event; the first warnings and errors are kept in any case."""
+        """Process an event; always keep the first warnings and errors."""
         if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
             self.troubles.append(f"{event.t:.3f} s: {event.text[:_TEXT_CHARS_MAX]}")
         if self.keeper and event.kind is not EventKind.LINK:  # what they came to is in the result
@@ -68,7 +68,7 @@ class Figures:
 
 
 class Lengths(NamedTuple):
-    """How much of the files of a SharedKeeper counts, bytes."""
+    """Valid lengths of the files of a SharedKeeper, bytes."""
 
     columns: int = 0
     events: int = 0
@@ -91,15 +91,15 @@ class SharedKeeper:
 
     @property
     def lengths(self) -> Lengths:
-        """How much counts by now."""
+        """Valid lengths so far."""
         return Lengths(self._columns.length, self._events.length)
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         self._columns.append(np.stack(list(columns(block).values()), axis=1).tobytes())
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         data = pickle.dumps(tuple(event))
         self._events.append(len(data).to_bytes(4, "little") + data)
 

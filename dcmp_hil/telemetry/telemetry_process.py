@@ -174,7 +174,7 @@ class Apart:
         self._send_events()
 
     def close(self) -> None:
-        """Have the rest worked out and the sinks closed; take over what the process cannot; 2 s at most."""
+        """Finish the figures and close the sinks, within 2 s; take over what the process cannot do."""
         sentence = ""
         if self._process and self._channel:
             with self._channel:
@@ -258,7 +258,7 @@ class Apart:
     # ---------------------------------------------------------------- without it
 
     def _take_over(self) -> None:
-        """Go on where the process stopped writing down how far it was: at the very end, if all is well."""
+        """Continue from the last state that the process wrote: at the very end, if all is well."""
         state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths(), [])
         keeper = SharedKeeper(self._kept, state.kept) if self._kept else None
         self.figures = Figures(state.statistics, keeper)

@@ -178,7 +178,7 @@ class _Watcher:
             audience.event(event)
 
     def _take_events(self) -> bool:
-        """Take what the parent sent; tell whether that was the last."""
+        """Receive what the parent sent; return whether that was the last."""
         while True:
             try:
                 message = self._channel.recv(MESSAGE, socket.MSG_DONTWAIT)

@@ -48,7 +48,7 @@ class Receiver:
         self._too_long = False
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take bytes; return the frames that are complete now."""
+        """Decode bytes; return the frames that are complete now."""
         chunks = (self._rest + data if self._rest else data).split(b"\0")
         rest = chunks.pop()
         frames = []

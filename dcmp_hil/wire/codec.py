@@ -137,7 +137,7 @@ def pack(message: Message, node: int = 0) -> Frame:
 
 
 def _misfit(message: Any, to_bytes: Callable[[Any], bytes]) -> str:
-    """Say which field does not fit: it does not among zeros either. `struct` itself does not know."""
+    """Return the field that does not fit, found by trying each among zeros; `struct` does not say."""
     zeros = message._make([0] * len(message))
     fields = message._asdict().items()
     return next(

@@ -1,4 +1,4 @@
-"""How well a link carries: what is counted, and what the counts mean."""
+"""Quality of a link: counters, and the problems that they show."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class DeviceCounters:
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What went wrong on the way and was survived."""
+    """Counts of errors on the link that the run survived."""
 
     samples: int = 0  # SAMPLEs that arrived, the device in RUN
     lost: int = 0  # SAMPLEs that never came
@@ -84,7 +84,7 @@ class Concern(NamedTuple):
 
 
 def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concern]:
-    """Say what is wrong with a link, the likely cause first.
+    """Return the problems of a link, the likely cause first.
 
     Parameters
     ----------

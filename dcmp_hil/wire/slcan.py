@@ -33,7 +33,7 @@ class Receiver:
         self._too_long = False
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take bytes; return the frames that are complete now."""
+        """Decode bytes; return the frames that are complete now."""
         *lines, rest = (self._rest + data).split(b"\r")
         frames = []
         for line in lines:

@@ -105,7 +105,7 @@ class BoardLink:
         """Do nothing: a board ticks only while it is read."""
 
     def send(self, frame: Frame) -> None:
-        """Give a frame to the board."""
+        """Pass a frame to the board."""
         if self._encode is None:
             self._board.receive_frame(*frame)
         else:

@@ -68,7 +68,7 @@ class Board:
         self._out_at = self._view[hostlib.OUT_OFFSET]
 
     def tick(self) -> None:
-        """Let a period pass: the output that was held moves the plant, then the firmware has its tick."""
+        """Simulate one period: the held output moves the plant, then the firmware runs its tick."""
         if self.tick_count:
             self.pins.advance(self._view[_VOLTAGE])
             self.now_us = (self.now_us + self._period_us) & _WORD
@@ -76,7 +76,7 @@ class Board:
         self._c_tick(self._at, self.now_us, self.pins.count())
 
     def receive(self, data: bytes) -> None:
-        """Give bytes to the device, between two ticks."""
+        """Pass bytes to the device, between two ticks."""
         self._c_receive(self._at, data, len(data), self.now_us)
 
     def transmit(self) -> bytes:
@@ -84,7 +84,7 @@ class Board:
         return self._sent() if self._view[_LENGTH] else b""
 
     def receive_frame(self, number: int, data: bytes) -> None:
-        """Give a frame to the device, between two ticks, on any carrier."""
+        """Pass a frame to the device, between two ticks, on any carrier."""
         self._lib.hostlib_receive_frame(self._at, number, data, len(data), self.now_us)
 
     def transmit_frames(self) -> list[tuple[int, bytes]]:
@@ -95,7 +95,7 @@ class Board:
         return [(number, data[:length]) for number, length, data in records]
 
     def advance(self, microseconds: int) -> None:
-        """Let time pass within a period: the watchdog is looked at."""
+        """Advance time within a period; the watchdog is checked."""
         self.now_us = (self.now_us + microseconds) & _WORD
         self._lib.hostlib_look(self._at, self.now_us)
 

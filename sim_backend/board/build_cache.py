@@ -74,7 +74,7 @@ def _is_own(path: Path) -> bool:
 
 
 def _restrict(place: Path) -> None:
-    """Take the right to write in this user's folder from all others.
+    """Restrict write access to this user's folder to this user.
 
     Raises
     ------

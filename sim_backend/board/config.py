@@ -1,4 +1,4 @@
-"""What a board of a rig is built with: `struct dcmp_config` of the firmware, field by field."""
+"""Build configuration of a rig's board: `struct dcmp_config` of the firmware, field by field."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a board's pins are connected to: the plant's encoder, and the amplifier's power stage."""
+"""Connections of a board's pins: the plant's encoder, and the amplifier's power stage."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class PlantIO:
         self.truth = self._plant.advance(voltage)
 
     def inject(self, faults: PlantFaults) -> None:
-        """Let faults come between the pins and the plant, instead of earlier ones."""
+        """Inject faults between the pins and the plant, in place of earlier ones."""
         plant, encoder = self._healthy
         self._plant, self._encoder = faults.plant(plant), faults.encoder(encoder)
 
     def stretch(self, factor: float) -> None:
-        """Let what the board calls a period last `factor` times as long."""
+        """Make the board's period `factor` times as long."""
         self._plant.stretch(factor)
 
     def count(self) -> int:

@@ -25,7 +25,7 @@ class Symlink:
         self._port = ""
 
     def make(self, port: str) -> None:
-        """Let it lead to a port.
+        """Create the symbolic link to a port.
 
         Raises
         ------

@@ -232,7 +232,7 @@ class VirtualDevice:
         self._ticked = (self.now_us, sent_ns, self._now_ns())
 
     def _listen(self) -> bool:
-        """Take what the firmware says; return whether an answer to a tick was among it."""
+        """Process the firmware's output; return whether it contained an answer to a tick."""
         try:
             data = self._plug().recv(4096)
         except OSError as error:

@@ -1,4 +1,4 @@
-"""What every fault has: parameters with units and bounds, its own random numbers, a time when it is on."""
+"""Base of all faults: parameters with units and bounds, own random numbers, and active times."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Choice:
 
 
 class FaultContext(NamedTuple):
-    """What a function that decides when a fault begins may look at."""
+    """Facts for a function that decides when a fault begins."""
 
     tick: int  # periods since the backend was opened
     t: float  # s, the same
@@ -51,7 +51,7 @@ class FaultContext(NamedTuple):
 
 
 class RigFacts(NamedTuple):
-    """What faults may know of the rig that they are injected into."""
+    """Facts of the rig that faults may use."""
 
     carrier: str  # `cobs`, `slcan` or `can`; empty where there is no wire
     wired: bool  # whether a board stands between host and plant
@@ -100,7 +100,7 @@ class FaultModel:
         """Stop: the first period in which it is off again."""
 
     def tick(self, board: Board | None) -> None:
-        """Let a period begin in which it is on."""
+        """Begin a period in which the fault is active."""
 
 
 @dataclass(frozen=True, slots=True)

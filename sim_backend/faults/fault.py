@@ -1,4 +1,4 @@
-"""One fault: its kind, when it is on, and its parameters."""
+"""A fault: its kind, its active time, and its parameters."""
 
 from __future__ import annotations
 

@@ -18,12 +18,12 @@ _IDENTIFIER_MAX, _PAYLOAD_BYTES_MAX = 0x7FF, 8
 
 
 class LineFaults(Protocol):
-    """What goes wrong on a line, and the time of the faults, which is that of the board."""
+    """Protocol of the faults on a line, whose time is that of the board."""
 
     listener: FaultListener
 
     def tick(self) -> None:
-        """Let a period begin."""
+        """Begin a period."""
         ...
 
     def passed(self, piece: bytes, way: Way) -> list[bytes]:
@@ -53,14 +53,14 @@ class FaultyLink(BoardLink):
         self._rest = b""
 
     def send(self, frame: Frame) -> None:
-        """Give a frame, or what is left of it, to the board."""
+        """Pass a frame, changed by the faults, to the board."""
         number, data = frame
         piece = number.to_bytes(2, "little") + data if self._encode is None else self._encode(frame)
         for arriving in self._faults.passed(piece, "up"):
             self._deliver(arriving)
 
     def elapse(self, periods: int) -> None:
-        """Let the board go on while the host does nothing."""
+        """Run the board while the host does nothing."""
         for _ in range(periods):
             self._let_tick()
             self._fetch()

@@ -44,11 +44,11 @@ class WrongClock(FaultModel):
     """The board's clock and what it moves; put in by the injector."""
 
     def begin(self) -> None:
-        """Go at the wrong rate."""
+        """Set the wrong rate."""
         self._stretch(1.0 / self._rate)
 
     def end(self) -> None:
-        """Go right again."""
+        """Restore the right rate."""
         self._stretch(self._rate)
 
     def _stretch(self, factor: float) -> None:

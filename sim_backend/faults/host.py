@@ -16,7 +16,7 @@ _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class InjectedError(Exception):
-    """What `host.raise` raises, as a bug in a user's controller would."""
+    """Exception of `host.raise`, as by a bug in a user's controller."""
 
 
 class InjectedBaseError(BaseException):

@@ -147,7 +147,7 @@ class Injector:
         }
 
     def attach(self, board: Board, carrier: str, pacer: Pacer) -> FaultyLink:
-        """Take hold of a board; return the line to it."""
+        """Inject the faults into a board; return the line to it."""
         self.board = board
         board.pins.inject(self)
         self._truth = board.truth
@@ -178,7 +178,7 @@ class Injector:
         self._tick, self._open = -1 if self._facts.wired else 0, True  # a board ticks first
 
     def tick(self) -> None:
-        """Let a period begin."""
+        """Begin a period."""
         self._tick += 1
         self._look()
         for timer in self.timers:

@@ -1,4 +1,4 @@
-"""Who is told of what passes between host and board while faults are injected."""
+"""Protocol of a listener to the traffic between host and board during fault injection."""
 
 from __future__ import annotations
 

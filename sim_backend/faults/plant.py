@@ -35,7 +35,7 @@ class Acting(Protocol):
         ...
 
     def tick(self) -> None:
-        """Let a period begin."""
+        """Begin a period."""
         ...
 
 

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 
 class HostFaults(Protocol):
-    """What goes wrong between the stages of a period."""
+    """Faults between the stages of a cycle."""
 
     listener: FaultListener
 
     def opened(self) -> None:
-        """Let the time of the faults begin."""
+        """Start the time of the faults."""
         ...
 
     def sample(self, sample: Sample) -> Sample:
@@ -65,7 +65,7 @@ class FaultyBackend:
         return self._faults.sample(sample)
 
     def write(self, voltage: float) -> None:
-        """Give a voltage to the backend, V."""
+        """Send a voltage to the backend, V."""
         self._faults.listener.wrote(voltage)
         self._backend.write(voltage)
 

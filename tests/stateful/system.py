@@ -158,7 +158,7 @@ class System:
             self.close(over.error())
 
     def alone(self, ticks: int) -> None:
-        """Let the board go on while the host does nothing."""
+        """Run the board while the host does nothing."""
         self._link.elapse(ticks)
 
     def inject_fault(self, kind: str, ticks: int) -> None:

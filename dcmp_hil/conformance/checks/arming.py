@@ -177,7 +177,7 @@ def stopped_in_run(client: Client) -> Iterator[str]:
 
 
 def second_host(client: Client) -> Iterator[str]:
-    """Let a second host try, while the first drives."""
+    """Check that a second host is refused while the first drives."""
     session = client.own()
     run(client, session)
     other = client.another_session()

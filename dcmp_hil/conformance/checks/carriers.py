@@ -100,7 +100,7 @@ _COMMANDS = {
 
 
 def slcan_commands(client: Client) -> Iterator[str]:
-    """Give each command and compare its answer."""
+    """Send each slcan command and compare its answer."""
     for command, answer in _COMMANDS.items():
         said = _said(client, command)
         if said != [answer]:

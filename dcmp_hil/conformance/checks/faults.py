@@ -80,7 +80,7 @@ def _repeated(client: Client, at: int) -> Iterator[str]:
 
 
 def _drive_in_fault(client: Client, session: int, *, clear: bool, voltage_mV: int = 0) -> int:
-    """Have one DRIVE accepted and return the state that follows."""
+    """Send a DRIVE that is accepted; return the state after it."""
     for _ in range(20):
         client.newest()
         mark = client.mark()
@@ -109,7 +109,7 @@ def clear(client: Client) -> Iterator[str]:
 
 
 def of_one_session(client: Client) -> Iterator[str]:
-    """Have one host's DRIVE with clear = 0, and another's with clear = 1."""
+    """Send DRIVE with clear = 0 from one host, and with clear = 1 from another."""
     first = client.own()
     stopped(client)
     for _ in range(20):

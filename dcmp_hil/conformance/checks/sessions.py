@@ -103,7 +103,7 @@ _COUNTER_MAX = 240  # a counter of HEALTH below this has room
 
 
 def _accepted(client: Client, session: int) -> None:
-    """Have a DRIVE accepted: order has a predecessor then."""
+    """Send a DRIVE that is accepted, so that the next one has a predecessor."""
     for _ in range(50):
         client.newest()
         mark = client.mark()
@@ -130,7 +130,7 @@ def two_hellos(client: Client) -> Iterator[str]:
 
 
 def release(client: Client) -> Iterator[str]:
-    """Give the device back by a DRIVE."""
+    """Release the device by a DRIVE."""
     session = client.own()
     for _ in range(20):
         client.newest()

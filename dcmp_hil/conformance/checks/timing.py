@@ -70,7 +70,7 @@ def tick_parameter(client: Client) -> Iterator[str]:
 
 
 def counter_goes_on(client: Client) -> Iterator[str]:
-    """Let SAMPLEs pass unsent or unread; the counter has counted them."""
+    """Check that the tick also counts SAMPLEs that were not received."""
     line, clock = client.line, client.clock
     first = client.value(Parameter.TICK)
     began_ns = clock.now_ns()

@@ -15,7 +15,7 @@ class Controller(Protocol):
 
 
 class ControllerContext(NamedTuple):
-    """What a controller is made with: what it may know of the rig it serves.
+    """Facts of the rig for the constructor of a controller.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class ControllerContext(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """What of a PD controller may change while it runs."""
+    """Gains of a PD controller, which may change during a run."""
 
     kp: float  # 1/s2
     kd: float  # 1/s

@@ -61,7 +61,7 @@ class PdCompensated:
 
     @property
     def gains(self) -> Gains:
-        """What it works with; may be set between two periods."""
+        """Gains in use; may be set between two cycles."""
         return Gains(self._kp, self._kd, self._compensation)
 
     @gains.setter

@@ -16,7 +16,7 @@ class Observer(Protocol):
 
 
 class ObserverContext(NamedTuple):
-    """What an observer is made with: what it may know of the rig it serves.
+    """Facts of the rig for the constructor of an observer.
 
     Parameters
     ----------

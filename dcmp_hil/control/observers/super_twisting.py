@@ -26,7 +26,7 @@ _Step = tuple[float, float, float, float, float, float, float, float, float, flo
 
 
 class Tuning(NamedTuple):
-    """Everything that follows from gains, model and period: worked out once, and small enough to be sent."""
+    """Constants derived from gains, model and period; computed once, and small enough to be sent."""
 
     L1: float  # 1/s
     L2: float  # 1/s2
@@ -163,7 +163,7 @@ class SuperTwisting:
         )
 
     def retune(self, tuning: Tuning) -> None:
-        """Go on with other gains, from the same position, velocity, disturbance and slope of the disturbance.
+        """Change the gains; keep the estimates of position, velocity, disturbance and its slope.
 
         e = y - z1 obeys e'' + (L1 + f0) e' + (L2 + f0 L1) e = w. Under another L1 or L2 the present e would
         be far from where w leads it, and the way there faster than the differentiator can follow: the copy
@@ -195,7 +195,7 @@ class SuperTwisting:
         return Estimate(y, 0.0, 0.0)
 
     def _step(self, dt: float) -> _Step | None:
-        """Find the coefficients of a step that is not one period; None where nothing can be continued."""
+        """Return the coefficients for a step of another length; None if the state cannot be continued."""
         if dt <= 0.0:
             raise standing_still(self._t, self._t + dt)
         if not dt < _LONGEST_GAP * self._period + self._tolerance:  # NaN: the first sample
@@ -223,7 +223,7 @@ def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0
 
 
 def _solve(dt: float, f0: float, L1: float, L2: float, mu0: float) -> _Step:
-    """Everything that depends on the step alone, flat: unpacked once a period."""
+    """Return the constants that depend on the step alone, as one tuple."""
     return (*luenberger_copy(dt, f0, L1, L2), *_per_step(matched_gains(mu0 * dt), dt))
 
 

@@ -1,4 +1,4 @@
-"""What a link is: frames out, frames in, and nothing about what they mean."""
+"""Protocol of a link: it sends and receives frames, and does not interpret them."""
 
 from __future__ import annotations
 

@@ -185,7 +185,7 @@ class CanLink:
         return None
 
     def _check_up(self, bus: can.BusABC) -> None:
-        """Look once: an interface that is down can be opened, and fails at the first look only."""
+        """Poll once: an interface that is down can be opened, and fails at the first poll only."""
         try:
             bus.recv(0.0)
         except can.CanError as error:

@@ -1,4 +1,4 @@
-"""What the operating system says of a port, in the reader's words."""
+"""Errors of the operating system at a port, in words with a remedy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 
 
 def cannot_open(path: str, error: BaseException) -> OpenError:
-    """Say why a port cannot be opened, and what to do.
+    """Return the error for a port that cannot be opened, with a remedy.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def cannot_open(path: str, error: BaseException) -> OpenError:
 
 
 def reason(error: BaseException) -> str:
-    """Say what a library's words about a broken port come to."""
+    """Return the reason in a library's error about a broken port."""
     words = str(error)
     return "the other end has hung up" if "returned no data" in words else words
 
@@ -62,7 +62,7 @@ def _number_of(error: BaseException | None) -> int | None:
 
 
 def holder(path: str) -> str:
-    """Say which other process has a port open, such as `dcmp-hil (process 4711)`; empty if unknown."""
+    """Return which other process has a port open, such as `dcmp-hil (process 4711)`; empty if unknown."""
     try:
         wanted = os.stat(path).st_rdev  # noqa: PTH116 - devices are compared by number, not by path
     except OSError:

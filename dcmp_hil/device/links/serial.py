@@ -151,7 +151,7 @@ class SerialLink:
         return frames.popleft() if frames else None
 
     def _keep_first(self, data: bytes) -> None:
-        """Keep what is heard until the first frame shows that the carrier is right."""
+        """Keep received bytes until the first frame shows that the carrier is right."""
         self._first += data
         self._unknown = not self._frames and len(self._first) < _CARRIER_CHECK_BYTES
 

@@ -15,7 +15,7 @@ _WITHOUT_BITRATE = ("vcan", "vxcan", "slcan")  # virtual, or told by slcand
 
 
 def check_there(settings: Can) -> None:
-    """Look for the interface; python-can would log its absence, and leave a socket open.
+    """Raise if the interface does not exist; python-can would log that, and leave a socket open.
 
     Raises
     ------

@@ -23,7 +23,7 @@ _BEYOND_LIMIT = 1.3  # so that the lines of the limit show
 
 
 def dashboard(rig: RigView) -> rrb.Blueprint:
-    """Lay out the run of a rig: the arm, what it does, what is asked of the motor, and how the loop fares."""
+    """Return the layout of the dashboard: the arm, its motion, the motor's voltage, and the loop's timing."""
     left = rrb.Vertical(_pendulum(rig), _portrait(), _parameters(), row_shares=[36, 32, 32])
     plots = {path: _plot_of(path, len(signals), rig) for path, signals in by_plot().items()}
     joint = rrb.Vertical(*(plots[path] for path in plots if path.startswith(_JOINT)))
@@ -59,7 +59,7 @@ def plot(
     name: str = "",
     contents: str | list[str] = "$origin/**",
 ) -> rrb.TimeSeriesView:
-    """Lay out a plot.
+    """Return the view of a plot.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def plot(
 
 
 def _plot_of(path: str, lines: int, rig: RigView) -> rrb.TimeSeriesView:
-    """Lay out a plot of the table of signals; a single line needs no name."""
+    """Return the view of a plot of the table of signals; a single line needs no name."""
     limit = rig.voltage_limit if path == _VOLTAGE else None
     return plot(
         path,

@@ -1,4 +1,4 @@
-"""What is told of a dashboard that is incomplete, or that the run goes on without."""
+"""Warnings of a dashboard that is incomplete or missing."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stuck(outlet: Outlet) -> str:
 
 
 def incomplete(outlet: Outlet, reason: str) -> str:
-    """Say that a recording, or what a viewer got, is incomplete, with what was measured."""
+    """Return the warning for an incomplete recording or view, with the measured figures."""
     if outlet.file is None:
         return f"What the viewer shows is incomplete: {reason}."
     measured = f"{1e-6 * outlet.size():.1f} MB are in it"
@@ -56,5 +56,5 @@ def incomplete(outlet: Outlet, reason: str) -> str:
 
 
 def spared(file: Path, what: str, needed: float) -> str:
-    """Say that a file, which ends or is not written, leaves so many bytes to the data of the run."""
+    """Return the note that a file ends, or is not written, to leave space for the data of the run."""
     return _FULL_DISK_NOTE.format(file=file, what=what, needed=1e-6 * needed)

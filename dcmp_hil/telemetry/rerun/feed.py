@@ -1,4 +1,4 @@
-"""What one outlet is sent: frames of its own, in blocks as long as suits it."""
+"""Data for one outlet: frames of its own, in blocks of a suitable length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long the periods of a run really were, how late and how busy, as histograms that grow."""
+"""Histograms of the period, lateness and compute time of a run, which grow during the run."""
 
 from __future__ import annotations
 

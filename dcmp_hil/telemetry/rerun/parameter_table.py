@@ -19,7 +19,7 @@ _TUNED = ("controller.", "observer.", "reference.")
 
 
 class Parameters:
-    """What a run is tuned by, as far as its events tell.
+    """Tunable values of a run, as known from its events.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Parameters:
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """Those that can be drawn over what they were at the start: numbers, and not 0 then."""
+        """Names of the values that can be drawn relative to the start: numbers that were not 0 then."""
         return tuple(self._start)
 
     @property
@@ -59,7 +59,7 @@ class Parameters:
                 yield key, value
 
     def take(self, event: Event) -> dict[str, float] | None:
-        """Take an event; return the numbers that it changed, None if it tells of no change."""
+        """Process an event; return the numbers that it changed, None if it is no change."""
         if not isinstance(event.data, ChangeData):
             return None
         changed = event.data.values

@@ -1,4 +1,4 @@
-"""What a recording begins with; done by the thread of its outlet, since Rerun may never return from it."""
+"""Start of a recording, on the thread of its outlet, since Rerun may never return."""
 
 from __future__ import annotations
 

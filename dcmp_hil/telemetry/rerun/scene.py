@@ -1,4 +1,4 @@
-"""What a recording shows that does not change: styles of lines, the drawn pendulum, versions."""
+"""Static contents of a recording: styles of lines, the drawn pendulum, versions."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def write_series(
 
 
 def _error_of(steps: Iterator[None]) -> Exception | None:
-    """Take steps on a thread, as Rerun may never return where the disk is full; return their error."""
+    """Run steps on a thread, as Rerun may never return on a full disk; return their error."""
     answers: Queue[Exception | bool] = Queue()
 
     def take() -> None:

@@ -121,7 +121,7 @@ class RerunSink:
         atexit.register(self.close)
 
     def block(self, block: Block) -> None:
-        """Take consecutive periods."""
+        """Process a block of consecutive cycles."""
         if not len(block):
             return
         self._spare()
@@ -133,7 +133,7 @@ class RerunSink:
                 self.warnings.append(NO_WINDOW.format(code=code, port=self.port))
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Process an event."""
         self._tell(lambda feed: feed.event(event))
 
     def close(self) -> None:
@@ -244,7 +244,7 @@ class RerunSink:
             self._open_window(outlet, self.port)
 
     def _serve(self, first_port: int) -> Outlet | None:
-        """Let viewers come and go; who comes late gets what there was."""
+        """Serve viewers, which may connect at any time; a late one gets the earlier data."""
         for port in window.free_ports(first_port):
             target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
             outlet = self._open_viewer(target, _CLOSE_TIMEOUT_S)

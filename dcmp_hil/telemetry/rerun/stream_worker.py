@@ -85,7 +85,7 @@ class Outlet:
 
     @property
     def stalled(self) -> float:
-        """How long (s) the file has not grown while a job for it is done; 0 for a viewer."""
+        """Time (s) for which the file has not grown during a job; 0 for a viewer."""
         began_ns, now_ns = self._began_ns, self._clock.now_ns()
         if self.file is None or not began_ns:
             return 0.0
@@ -103,7 +103,7 @@ class Outlet:
         )
 
     def do(self, job: Job) -> bool:
-        """Put `job` behind those that wait; False if there was no room in all the time of `patience`.
+        """Queue `job`; return False if there was no room within `patience`.
 
         Raises
         ------

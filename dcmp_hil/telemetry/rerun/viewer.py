@@ -65,7 +65,7 @@ def free_port(first: int = PORT) -> int | None:
 
 
 def serves(port: int, pid: int, within: float) -> bool:
-    """Tell whether process `pid` came to listen on `port`; False as soon as another one does.
+    """Return whether process `pid` came to listen on `port`; False as soon as another one does.
 
     Between the look for a free port and its use another process may take it, and then answers in its place.
 
@@ -128,7 +128,7 @@ def answers(port: int, within: float) -> bool:
 
 
 def speaks_http2(port: int, within: float = _ANSWER_TIMEOUT_S) -> bool:
-    """Tell whether a server answers on `port`, as a viewer does; one that is frozen only accepts."""
+    """Return whether a server answers on `port`, as a viewer does; a frozen one only accepts."""
     try:
         with socket.create_connection((LOOPBACK, port), timeout=within) as connection:
             connection.sendall(_HTTP2_PREFACE)
