@@ -1,4 +1,4 @@
-"""The loop: one period is one straight line, and everything else exists to keep it so."""
+"""The loop: One cycle is one straight line, and everything else exists to keep it so."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Stop(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The stages of a period, in the order in which a sample passes them."""
+    """The stages of a cycle, in the order in which a sample passes them."""
 
     backend: Backend
     outliers: Outliers
@@ -67,7 +67,7 @@ def run(line: Line, until: float, stop: Stop) -> float:
     until
         s, device time; the period whose sample is at or after it is the last.
     stop
-        Looked at once a period.
+        Checked once a cycle.
 
     Returns
     -------

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Urgency(Enum):
     """Time that the way to 0 V may take."""
 
-    NOW = auto()  # 0 V in this period
+    NOW = auto()  # 0 V in this cycle
     RAMP = auto()  # authority shrinks to 0 V within 50 ms
 
 

@@ -1,4 +1,4 @@
-"""The one vocabulary: what travels between the stages of a period, a unit on every line."""
+"""The one vocabulary: what travels between the stages of a cycle, a unit on every line."""
 
 import math
 from collections.abc import Mapping
@@ -90,7 +90,7 @@ class EventKind(StrEnum):
     CHANGE = "change"  # made while the run went on
     CONTROL = "control"  # a change that failed, or live changes that are not possible any more
     TELEMETRY = "telemetry"  # what of telemetry the run goes on without
-    LOWERING = "lowering"  # the way down begins with the next period
+    LOWERING = "lowering"  # the way down begins with the next cycle
     TRIP = "trip"
     DEADLINE = "deadline"
     DEVICE_END = "device_end"  # the device ended the run by a fault of its own

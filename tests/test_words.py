@@ -16,7 +16,7 @@ _ROOT = Path(__file__).parents[1]
 _VAGUE = re.compile(
     r"(?<![a-z])("
     r"whoever|whomever|whatever|wherever|nobody|somebody|anybody|everybody|someone|anyone|everyone|somewhere"
-    r"|luck|luckily|lucky|befall|befalls|befallen|befell|lookers?[-_ ]on"
+    r"|luck|luckily|lucky|befall|befalls|befallen|befell|onlookers?|lookers?[-_ ]on"
     r"|(look|looks|looked|looking|hand|hands|handed|handing)[-_ \n]+on"
     r")(?![a-z])",
     re.IGNORECASE,

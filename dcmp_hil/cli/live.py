@@ -25,7 +25,7 @@ def set_keys(
 ) -> None:
     """Change gains or the reference of a run that goes on; the voltage has no step.
 
-    It is checked as rig.toml is, applied between two periods, and confirmed. Limits cannot be changed.
+    It is checked as rig.toml is, applied between two cycles, and confirmed. Limits cannot be changed.
     """
     from dcmp_hil.live.client import change, find_run
 

@@ -20,7 +20,7 @@ _WARNING = "yellow"
 
 
 class StatusLine:
-    """A sink that shows the newest period on one line, and events above it.
+    """A sink that shows the newest cycle on one line, and events above it.
 
     Parameters
     ----------

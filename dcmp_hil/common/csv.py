@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _MOST_FAULTS = 5  # named one by one; the rest are counted
 _LONGEST_SHOWN = 40  # characters of a field
 _DELIMITERS = ",;\t"
-_FILE_MAX_MIB = 16  # a reference has a row a corner, not a row a period
+_FILE_MAX_MIB = 16  # a reference has a row a corner, not a row a cycle
 
 
 class Text(NamedTuple):

@@ -168,7 +168,7 @@ class TimingSection(Section):
     switch_interval_us: Annotated[int, Field(ge=20, le=5000)] = 100  # at 10 us no thread makes progress
     """Interval after which a Python thread that holds the interpreter lock releases it, us."""
     overrun: Literal["hold", "skip", "stop"] = "hold"
-    """A late period: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""
+    """A late cycle: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""
     overrun_limit: Annotated[int, Field(ge=1, le=20)] = 5
     """`stop` ends the run at this many late ones of 20 periods; late is half a period, or slower than one."""
 

@@ -29,7 +29,7 @@ FIELDS = (
 )
 """Columns of a row, in SI units, in the order in which a Cycle and what goes with it are laid out flat."""
 
-NOWHERE = Reference(math.nan, math.nan, math.nan)
+NO_REFERENCE = Reference(math.nan, math.nan, math.nan)
 _NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
 _HEADER_BYTES, _ROW_BYTES = 64, _NUMBERED.size
 _pack = _NUMBERED.pack_into
@@ -68,7 +68,9 @@ class Ring:
         # One store of the CPU; `pack_into` would clear the place first, and a reader might find 0 there.
         self._count = memoryview(self.memory)[:8].cast("q")
 
-    def push(self, cycle: Cycle, truth: Truth, now: Reference = NOWHERE, began: float = -math.inf) -> None:
+    def push(
+        self, cycle: Cycle, truth: Truth, now: Reference = NO_REFERENCE, began: float = -math.inf
+    ) -> None:
         """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
         sample, estimate, reference, demand, voltage, timing = cycle
         k = self._written

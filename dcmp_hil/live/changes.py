@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 RAMP = 0.25  # s, over which gains go from old to new
 _PLACES = {phase.value: place for place, phase in enumerate(Phase)}
 _LISTED_CHANGES_MAX = 1000  # changes that the summary lists
-_EVERY_CYCLE = -1  # no number of the bell: there is something to do every period
+_EVERY_CYCLE = -1  # no number of the bell: there is something to do every cycle
 _OTHER_HANDLERS = (
     "Something in this process sets or blocks signals that end a run ({names}); they end it as before. Take "
     "the calls of signal.signal and pthread_sigmask out of the class of your own, or have the library leave "
@@ -57,7 +57,7 @@ class LiveChanges:
     Parameters
     ----------
     mailbox
-        One number of it is looked at every period.
+        One number of it is looked at every cycle.
     trajectory, controller, observer
         What is changed; a controller or observer of one's own never is.
     delay

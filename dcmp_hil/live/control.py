@@ -40,7 +40,7 @@ _REQUEST_BYTES_MAX = 1 << 16  # bytes of a request
 _CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change
 _POLL_PERIOD_S = 0.002  # s
 _STATE_PERIOD_S = 0.1  # s between two states that are sent to every watcher
-_CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest period
+_CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest cycle
 _SIGNAL_CHECK_ROUNDS = 4  # rounds between two looks of the loop at its signal handlers
 _STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in, after the end
 _STARTED_MESSAGE = b"u"
@@ -144,7 +144,7 @@ class Server:
         return state
 
     def look(self) -> bool:
-        """Note how old the newest period is; return whether the run's process is there."""
+        """Note how old the newest cycle is; return whether the run's process is there."""
         written = self._ring.written
         if written != self._written:
             self._written, self._newest_ns = written, self._clock.now_ns()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 FRESH = 0.5
-"""s, how old the newest period of a run that goes on may be."""
+"""s, how old the newest cycle of a run that goes on may be."""
 _PHASES = tuple(phase.value for phase in Phase)
 
 

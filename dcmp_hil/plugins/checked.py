@@ -1,7 +1,7 @@
-"""Stages of the user's own, with what they return checked once a period.
+"""Stages of the user's own, with what they return checked once a cycle.
 
 An observer or a controller that raises, or returns what it may not, goes on as NaN, and its `check` names
-class, file and line: the supervisor asks it in the same period and sends 0 V.
+class, file and line: the supervisor asks it in the same cycle and sends 0 V.
 """
 
 from __future__ import annotations

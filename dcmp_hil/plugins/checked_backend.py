@@ -1,4 +1,4 @@
-"""A backend of the user's own, with what it returns checked once a period; what it may not ends the run."""
+"""A backend of the user's own, with what it returns checked once a cycle; what it may not ends the run."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The run's own recording: an MCAP file with every period, every event, and what the run was."""
+"""The run's own recording: an MCAP file with every cycle, every event, and what the run was."""

@@ -49,7 +49,7 @@ def compare(recorded: RecordedRun, again: Again, start: float = 0.0) -> Comparis
     recorded, again
         The run, and what was made of it.
     start
-        s from the first period: the figures count what is not earlier. `identical` counts every period.
+        s from the first period: the figures count what is not earlier. `identical` counts every cycle.
     """
     block = recorded.block
     names = ("position", "velocity", "disturbance")

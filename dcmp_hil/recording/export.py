@@ -33,7 +33,7 @@ _REPLAYED_COLUMNS = (  # what a replay says a second time
 
 
 def to_csv(run: RecordedRun, path: Path) -> None:
-    """Write every signal, one row a period; numbers come back to the bit."""
+    """Write every signal, one row a cycle; numbers come back to the bit."""
     with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(names())
@@ -70,7 +70,7 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
 
 
 def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
-    """Write what observer and controller said then and now, one row a period."""
+    """Write what observer and controller said then and now, one row a cycle."""
     wanted = ("time_s", *_REPLAYED_COLUMNS)
     now = tuple(_now(again).values())
     with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:

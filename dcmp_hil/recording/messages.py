@@ -60,17 +60,17 @@ class Messages:
 
     @property
     def sequence(self) -> NDArray[np.uint32]:
-        """Number of each period from 1, shape (n,)."""
+        """Number of each cycle from 1, shape (n,)."""
         return np.frombuffer(self._sequence, "<u4")
 
     @property
     def log_time(self) -> NDArray[np.uint64]:
-        """Time of the log of each period, ns since 1970, shape (n,)."""
+        """Time of the log of each cycle, ns since 1970, shape (n,)."""
         return np.frombuffer(self._log_time, "<u8")
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """Every period, shape (n, len(FIELDS)); this memory is the collector's own."""
+        """Every cycle, shape (n, len(FIELDS)); this memory is the collector's own."""
         return np.frombuffer(self._rows, "<f8").reshape(-1, len(FIELDS))
 
     def channel_of(self, topic: str) -> int:

@@ -24,7 +24,7 @@ class Gap(NamedTuple):
     Parameters
     ----------
     start, stop
-        Device time of the last period before it and the first one behind it, s; None at an end of the run.
+        Device time of the last cycle before it and the first one behind it, s; None at an end of the run.
     periods
         How many; None where that is not known.
     """

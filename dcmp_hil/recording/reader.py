@@ -54,7 +54,7 @@ class RecordedRun:
     run
         What is known of the run: version, protocol, host, note.
     rows
-        Every period that is there and right, shape (n, len(FIELDS)), as it was in the ring.
+        Every cycle that is there and right, shape (n, len(FIELDS)), as it was in the ring.
     events
         What happened, in order.
     complete

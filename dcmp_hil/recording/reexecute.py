@@ -52,7 +52,7 @@ class Again:
 def run_again(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Again:
     """Hand the recorded samples, references and voltages to observer, predictor and controller.
 
-    Changes that were made while it went on are made again, in the same period.
+    Changes that were made while it went on are made again, in the same cycle.
 
     What was measured stays as it was: a controller that asks for something else does not move this arm.
 

@@ -46,7 +46,7 @@ _MOST_LOST = 100  # stretches that the end names
 
 
 class Recording:
-    """A sink that keeps every period and every event.
+    """A sink that keeps every cycle and every event.
 
     A disk that is full is asked again with every block; what waits meanwhile is kept up to a bound, and
     what is dropped beyond it is told with its time span.
@@ -91,7 +91,7 @@ class Recording:
         self._began_ns = int(utc_now().timestamp() * 1e9)  # of device time 0, near enough for a log
         self._period = self._event = 0  # numbers of the last ones
         self._dropped_told = 0
-        self._cut_at = 0  # number of the last period in a piece
+        self._cut_at = 0  # number of the last cycle in a piece
         self._t = self._cut_t = 0.0  # s, device time of the newest, and of the last in a piece
         self._attached = ((ABOUT, json.dumps(dict(run)).encode()), (RIG, rig.encode()))
         self.warnings: list[str] = []

@@ -17,7 +17,7 @@ _WINDOW_MASK = (1 << _WINDOW_PERIODS) - 1
 
 
 class Overruns:
-    """Looks at the timing of each period.
+    """Looks at the timing of each cycle.
 
     A period is late if its sample came more than half a period after its instant, or if its command took
     longer than a period. A device's clock runs off the host's, so the instant is that of the most punctual

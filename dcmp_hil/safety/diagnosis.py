@@ -79,7 +79,7 @@ class Diagnosis:
         self._noise = math.hypot(_NOISE_COUNTS * (math.tau / counts if counts else 0.0), _NOISE_MIN_RAD)
         self._seen: deque[Sample] = deque(maxlen=max(_SAMPLES_MIN, round(_WINDOW_S / setting.period)))
         self.add = self._seen.append
-        """Remember a sample; called every period, so there is no function around it."""
+        """Remember a sample; called every cycle, so there is no function around it."""
 
     @property
     def samples(self) -> Collection[Sample]:

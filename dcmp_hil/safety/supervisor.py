@@ -68,7 +68,7 @@ class Supervisor:
     Parameters
     ----------
     checks
-        Asked every period, in this order; the first objection is the cause.
+        Asked every cycle, in this order; the first objection is the cause.
     limits
         Clamps on what the line asks for, and the check of them.
     settle, engage
@@ -114,7 +114,7 @@ class Supervisor:
         self._stop_from = 0.0  # V, where an orderly end begins
         self._cause: Stop | None = None
         self._over: Stop | None = None
-        self._has_authority = False  # in RUNNING; asked every period
+        self._has_authority = False  # in RUNNING; asked every cycle
         self.phase = Phase.ARMING
         self.stopping = False
 
@@ -187,7 +187,7 @@ class Supervisor:
         refusal = self._probe.check(sample)
         if refusal is not None:
             self._refusal = (
-                refusal  # behind what the checks find in this period: a jump is no motion of the arm
+                refusal  # behind what the checks find in this cycle: a jump is no motion of the arm
             )
         elif self._probe.over:
             self._cue(Cue.PROBED, sample.t)

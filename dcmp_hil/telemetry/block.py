@@ -1,4 +1,4 @@
-"""A block: consecutive periods as columns, and the reference at each sample's own instant."""
+"""A block: consecutive cycles as columns, and the reference at each sample's own instant."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
-from dcmp_hil.ipc.ring import FIELDS, NOWHERE
+from dcmp_hil.ipc.ring import FIELDS, NO_REFERENCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +24,7 @@ _SAME_INSTANT_SHARE = 0.02  # of the delay: instants that differ by less are one
 
 
 class Block:
-    """`n` consecutive periods.
+    """`n` consecutive cycles.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Aligner:
         self._began = began
         self._since = began()
         self._due = math.nan  # the instant that the cycle before looked ahead to
-        self._then = NOWHERE
+        self._then = NO_REFERENCE
 
     def now(self, t: float, ahead: Reference) -> tuple[Reference, float]:
         """Return the reference at device time `t`, and when the trajectory began.

@@ -31,7 +31,7 @@ class Recorder:
     Parameters
     ----------
     truth
-        Asked once a period for what a simulation knows.
+        Asked once a cycle for what a simulation knows.
     aligner
         Finds the reference at each sample's own instant.
     sinks
@@ -100,7 +100,7 @@ class Recorder:
 
     @property
     def t(self) -> float:
-        """Device time of the last period, s; 0 before the first."""
+        """Device time of the last cycle, s; 0 before the first."""
         return self.recent[-1].sample.t if self.recent else 0.0
 
     @property

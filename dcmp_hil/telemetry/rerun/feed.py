@@ -51,7 +51,7 @@ class Feed:
         self._waiting: list[Block] = []
 
     def block(self, block: Block) -> bool:
-        """Send consecutive periods, at least one, or keep them until there are enough.
+        """Send consecutive cycles, at least one, or keep them until there are enough.
 
         Returns
         -------

@@ -73,7 +73,7 @@ class Frames:
                 self.plots[plot] = drawn
 
     def of_block(self, block: Block) -> list[Call]:
-        """Return the calls for consecutive periods, at least one."""
+        """Return the calls for consecutive cycles, at least one."""
         calls = [*self._lines(block), *self._slow(block), *self._states(block), *self._tuned(block["t"][-1:])]
         for field, histogram in self._histograms.items():
             if histogram.add(block["t"], block[field]):

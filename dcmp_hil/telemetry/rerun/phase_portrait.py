@@ -49,7 +49,7 @@ class Portrait:
         self._slot = self._picture = -1
 
     def add(self, block: Block) -> None:
-        """Add a block of at least one consecutive period."""
+        """Add a block of at least one consecutive cycle."""
         reference = block.reference
         columns = [
             *(block["t"], block["position_estimate"], block["velocity_estimate"]),

@@ -1,4 +1,4 @@
-"""A condition of each period, reduced to the periods in which it changed."""
+"""A condition of each cycle, reduced to the cycles in which it changed."""
 
 from __future__ import annotations
 
