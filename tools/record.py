@@ -51,7 +51,7 @@ def record(
     full_scale_mV
         mV, at 2048 codes from there; of a PWM board: the motor's supply.
     boot_count
-        Boots before the next one.
+        The highest number that a boot may have had so far.
     sequence
         The highest whole one counts.
     """

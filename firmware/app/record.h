@@ -17,7 +17,7 @@ enum record_link { RECORD_COBS, RECORD_SLCAN, RECORD_CAN };
 struct record {
     uint32_t magic;
     uint32_t sequence; /* the newest is the highest */
-    int32_t boot_count;
+    int32_t boot_count; /* the highest number that a boot may have had so far: boot_count.h */
     int32_t counts_per_rev;
     int32_t period_us;
     int32_t voltage_limit_mV;

@@ -96,7 +96,7 @@ def declarations() -> str:
     """Return every declaration of the core, preprocessed without the system's headers, which cffi knows."""
     folders = [f"-I{folder}" for folder in (CORE, APP, HERE, HERE / "no_headers")]
     command = [compiler(), "-E", "-P", "-nostdinc", "-D_Atomic=", *folders, "-"]  # cffi knows no _Atomic
-    text = '#include "core_checks.h"\n#include "app.h"\n#include "record.h"\n'
+    text = '#include "core_checks.h"\n#include "app.h"\n#include "boot_count.h"\n'
     return subprocess.run(command, check=True, input=text, capture_output=True, text=True).stdout
 
 

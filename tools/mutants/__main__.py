@@ -17,7 +17,7 @@ from tools.mutants.report import complaints, names, page, table
 from tools.mutants.trials import verdicts
 
 _CORE = ("watchdog", "supervisor", "guard", "amplifier", "session", "health", "device", "encoder", "receive")
-_APP = ("life", "app", "record", "fault_log", "ring")
+_APP = ("life", "app", "record", "boot_count", "fault_log", "ring")
 FILES = [CORE / f"dcmp_{name}.c" for name in (*_CORE, "history", "parameters")]
 FILES += [APP / f"{name}.c" for name in _APP]
 NAMES = HERE / "mutants.toml"

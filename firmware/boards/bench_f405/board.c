@@ -236,10 +236,11 @@ static void let_interrupts_come(void)
 
 static void start(void)
 {
+    static struct boot_memory boot_memory __attribute__((section(".noinit")));
     board.clock = clock_start(BOARD_CRYSTAL_HZ);
     timebase_start(board.clock.apb1_timers_Hz);
     board.settings = settings_read(BOARD_NUMBER, reset_take_cause(), amplifier_divides_supply());
-    settings_count_boot(&board.settings);
+    settings_count_boot(&board.settings, &boot_memory);
     if (board.clock.source != CLOCK_CRYSTAL) {
         board.settings.failure |= APP_NO_CRYSTAL;
     }

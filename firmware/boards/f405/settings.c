@@ -100,17 +100,34 @@ static bool append(const struct record *record)
            nvm_write(place.sector, place.index * sizeof(struct record), (const uint32_t *)record, RECORD_WORDS);
 }
 
-void settings_count_boot(struct settings *settings)
+/* Whether a record with this boot count is the newest now. */
+static bool reserve(const struct record *record, int32_t boot_count, uint32_t *sequence)
+{
+    struct record next = *record;
+    *sequence = record->sequence;
+    if (boot_count == record->boot_count) {
+        return true;
+    }
+    next.sequence++;
+    next.boot_count = boot_count;
+    record_seal(&next);
+    *sequence = next.sequence;
+    return append(&next);
+}
+
+void settings_count_boot(struct settings *settings, struct boot_memory *memory)
 {
     if (settings->failure != APP_WELL) {
         return; /* there is nothing worth writing */
     }
-    struct record next = *newest();
-    next.sequence++;
-    next.boot_count++;
-    record_seal(&next);
-    settings->config.boot_count = next.boot_count;
-    if (!append(&next)) {
+    const struct record *record = newest();
+    const struct boot boot = boot_next(memory, record);
+    uint32_t sequence;
+    settings->config.boot_count = 0;
+    if (!reserve(record, boot.reserved, &sequence)) {
         settings->failure = APP_NO_MEMORY;
+        return;
     }
+    boot_remember(memory, &boot, sequence);
+    settings->config.boot_count = boot.count;
 }

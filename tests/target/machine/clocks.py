@@ -13,7 +13,9 @@ HSI_HZ, HSE_HZ = 16e6, 8e6
 _HSE_US, _PLL_US, _FLASH_WORD_US, _FLASH_ERASE_US = 2000.0, 100.0, 16.0, 250_000.0
 _STEP_HZ = 30e6  # of the flash, a wait state each
 _DIVIDE_AHB = {8: 2, 9: 4, 10: 8, 11: 16, 12: 64, 13: 128, 14: 256, 15: 512}
-_RESET_BITS = {"power": (25, 26, 27), "pin": (26,), "software": (26, 28), "watchdog": (26, 29)}
+_RESET_BITS = {
+    "power": (25, 26, 27), "pin": (26,), "software": (26, 28), "watchdog": (26, 29), "brown-out": (25, 26),
+}  # fmt: skip
 
 
 class Rcc(Block):
@@ -124,6 +126,7 @@ class Flash(Block):
 
     NAME = "FLASH"
     KEYS = (0x4567_0123, 0xCDEF_89AB)
+    broken = False  # no write changes anything
 
     def reset(self) -> None:
         """Lock the flash."""
@@ -176,7 +179,7 @@ class Flash(Block):
             self.misuse(f"flash at {address:#x} is not blank")
         self.written += 1
         self.system.stand_still(_FLASH_WORD_US)
-        return before & value
+        return before if self.broken else before & value
 
 
 class Iwdg(Block):

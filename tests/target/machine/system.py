@@ -21,7 +21,7 @@ from tests.target.machine.agenda import Agenda
 from tests.target.machine.bus import Bus
 from tests.target.machine.clocks import Flash, Gpio, Iwdg, Pwr, Rcc
 from tests.target.machine.cpu import HARD_FAULT, RETURN, Cpu
-from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out
+from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out, lose_ram
 from tests.target.machine.ports import Can, Dac, Usart
 from tests.target.machine.stage import Stage
 from tests.target.machine.timers import EncoderTimer, PwmTimer, Timer
@@ -240,8 +240,10 @@ class System:
         self.reset(cause)
 
     def reset(self, cause: str) -> None:
-        """Start again: power, pin, software, watchdog. Memory stays as it is."""
+        """Start again: power, pin, software, watchdog, brown-out. The RAM is lost with the power alone."""
         self.resets.append((self.now_us, cause))
+        if cause == "power":
+            lose_ram(self.uc, len(self.resets))
         self._agenda = Agenda()
         self._asleep = False
         for block in self.blocks.values():
