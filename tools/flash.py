@@ -1,7 +1,7 @@
 """`python -m tools.flash`: write a board's program, and the record of what is connected to it.
 
 By default over the chip's own serial boot loader (BOOT0 high at reset, PA9 and PA10); with `--by pyocd` over
-a debug probe.
+a debug probe. The brown-out level is looked at first; a debug probe sets it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
 from sim_backend.board.config import board_config
+from tools import brown_out
 from tools.artefact import BOARDS
+from tools.brown_out import OptionError
 from tools.record import ADDRESS, RecordLink, image, record
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ INSTALL = {
     "stm32flash": "apt install --no-install-recommends stm32flash",
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
-_BOOTLOADER_BAUD = 115_200
+_TALK = ["stm32flash", "-b", "115200"]  # to the boot loader
 _DAC_V = 10.0  # V, full scale unless it is said
 _SUPPLY_V = (1.0, 100.0)  # V
 _NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
@@ -116,9 +118,8 @@ def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
     if by == "pyocd":
         to = ["--target", "stm32f405rg", "--format", "bin", "--base-address"]
         return [["pyocd", "flash", *to, f"{piece.address:#x}", str(piece.file)] for piece in pieces]
-    talk = ["stm32flash", "-b", str(_BOOTLOADER_BAUD)]
-    writes = [[*talk, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port] for piece in pieces]
-    return [*writes, [*talk, "-g", f"{VECTORS:#x}", port]]
+    writes = [[*_TALK, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port] for piece in pieces]
+    return [*writes, [*_TALK, "-g", f"{VECTORS:#x}", port]]
 
 
 def _arguments() -> argparse.Namespace:
@@ -134,14 +135,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--by", choices=tuple(INSTALL), default="stm32flash")
     parser.add_argument("--port", default="/dev/ttyUSB0", help="of the boot loader (default: /dev/ttyUSB0)")
     parser.add_argument("--firmware", type=Path, default=Path("dist/firmware"), help="made by make firmware")
-    parser.add_argument("--only", choices=("record", "program"), help="write one of the two")
+    parser.add_argument("--only", choices=("record", "program", "brown-out"), help="write one of them")
     parser.add_argument("--dry-run", action="store_true", help="show the commands")
     return parser.parse_args()
 
 
 def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
     pieces = []
-    if asked.only != "program":
+    if asked.only in (None, "record"):
         rig = load_rig(asked.rig, asked.sets)
         kept = folder / "record.bin"
         made = record_of(
@@ -153,7 +154,7 @@ def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
         )
         kept.write_bytes(image(made))
         pieces.append(Piece(kept, ADDRESS))
-    if asked.only != "record":
+    if asked.only in (None, "program"):
         base = asked.firmware / asked.board
         parts = [Piece(Path(f"{base}.code.bin"), CODE), Piece(Path(f"{base}.vectors.bin"), VECTORS)]
         missing = [part.file for part in parts if not part.file.is_file()]
@@ -165,7 +166,11 @@ def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
     return pieces
 
 
-def _run(command: list[str]) -> None:
+def _do(command: list[str], *, dry_run: bool) -> None:
+    """Show a command, and run it."""
+    sys.stdout.write(" ".join(command) + "\n")
+    if dry_run:
+        return
     tool = command[0]
     if shutil.which(tool) is None:
         raise RuntimeError(f"no {tool} here: {INSTALL[tool]}")
@@ -176,16 +181,67 @@ def _run(command: list[str]) -> None:
         )
 
 
+def _read(command: list[str], file: Path) -> int:
+    """Run a command that reads a word into a file; return the word."""
+    file.unlink(missing_ok=True)
+    _do(command, dry_run=False)
+    data = file.read_bytes() if file.is_file() else b""
+    if len(data) != brown_out.WORD_BYTES:
+        raise RuntimeError(
+            f"{' '.join(command)}: {len(data)} bytes were read, expected {brown_out.WORD_BYTES}. Nothing was "
+            "written. Look at the wires, and try again."
+        )
+    return int.from_bytes(data, "little")
+
+
+def _check_brown_out(file: Path, port: str) -> None:
+    """Look at the brown-out level over the boot loader; say so where it is not level 3."""
+    level = brown_out.level(_read(brown_out.read_by_boot_loader(file, _TALK, port), file))
+    if level != "level 3":
+        sys.stderr.write(
+            f"warning: the chip's brown-out level is {level}, but it writes flash memory safely from 2.7 V "
+            "on only (level 3). A debug probe sets it: --by pyocd --only brown-out.\n"
+        )
+
+
+def _set_brown_out(file: Path) -> None:
+    """Set brown-out level 3 over a debug probe, where it is another."""
+    settings = brown_out.planned(_read(brown_out.read_by_probe(file), file))
+    if settings is None:
+        return
+    if not _read(brown_out.hold_by_probe(file), file) & brown_out.HALTED:
+        raise OptionError(
+            "the processor did not halt, so that its program could disturb the write. Nothing was written. "
+            "Connect the probe's reset line, and try again."
+        )
+    _do(brown_out.write_by_probe(settings), dry_run=False)
+    brown_out.check_written(settings, _read(brown_out.read_by_probe(file), file))
+
+
+def _brown_out(asked: argparse.Namespace, file: Path) -> None:
+    if asked.dry_run:
+        by_probe = asked.by == "pyocd"
+        read = (
+            brown_out.read_by_probe(file)
+            if by_probe
+            else brown_out.read_by_boot_loader(file, _TALK, asked.port)
+        )
+        _do(read, dry_run=True)
+    elif asked.by == "pyocd":
+        _set_brown_out(file)
+    else:
+        _check_brown_out(file, asked.port)
+
+
 def main() -> int:
     """Write the pieces to the board, or print them."""
     asked = _arguments()
     with tempfile.TemporaryDirectory() as folder:
         try:
             pieces = _pieces(asked, Path(folder))
+            _brown_out(asked, Path(folder) / "option.bin")
             for command in commands(asked.by, pieces, asked.port):
-                sys.stdout.write(" ".join(command) + "\n")
-                if not asked.dry_run:
-                    _run(command)
+                _do(command, dry_run=asked.dry_run)
         except ConfigError as error:
             sys.stderr.write(f"error: {error}\n")
             return 2

@@ -122,8 +122,8 @@ def test_dry_run_shows_what_would_be_done(
 ) -> None:
     assert run(monkeypatch, DAC, "bench-serial", "--firmware", str(built), "--dry-run") == 0
     said = capsys.readouterr().out
-    assert [line.split(" -S ")[-1].split()[0] for line in said.splitlines()[:3]] == [
-        "0x8004000", "0x800c000", "0x8000000",
+    assert [line.split(" -S ")[-1].split()[0] for line in said.splitlines()[:4]] == [
+        "0x1fffc000:4", "0x8004000", "0x800c000", "0x8000000",
     ]  # fmt: skip
 
 
