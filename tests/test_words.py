@@ -113,3 +113,30 @@ def test_no_constant_is_one_vague_word() -> None:
 def test_the_constants_of_a_module_are_found() -> None:
     source = "_LOOK = 0.1\n_FEW, _MOST = 1, 2\n_LATE: int = 3\ndef f() -> None:\n    _SLOW = 1\n"
     assert list(_constants(source)) == ["LOOK", "FEW", "MOST", "LATE"]
+
+
+_PRONOUN = re.compile(r"(What|Who|How|Where|It|They|This|That|These|Those|Everything)\b")
+"""Beginnings of a summary that name neither a thing nor an action."""
+
+
+def _summaries(source: str) -> Iterator[str]:
+    """Yield the first line of every docstring of a module, its classes and functions."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            yield (ast.get_docstring(node) or "").partition("\n")[0]
+
+
+def test_summaries_begin_with_a_thing_or_an_action() -> None:
+    found = [
+        f"{path.relative_to(_ROOT)}: {summary}"
+        for room in ("dcmp_hil", "sim_backend", "tools")
+        for path in sorted((_ROOT / room).rglob("*.py"))
+        for summary in _summaries(path.read_text("utf-8"))
+        if _PRONOUN.match(summary)
+    ]
+    assert found == []
+
+
+def test_summaries_of_a_module_are_found() -> None:
+    source = '"""What it is."""\nclass A:\n    """A thing.\n\n    It is more."""\ndef f():\n    """Do."""\n'
+    assert list(_summaries(source)) == ["What it is.", "A thing.", "Do."]

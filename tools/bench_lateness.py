@@ -1,4 +1,4 @@
-"""How late the loop wakes up, against C in the same run, and what one period costs the host."""
+"""Lateness of the loop's wake-up, compared with C in the same run, and the host's time per cycle."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ int main(int count, char **words)
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """What some runs at one rate came to, a figure a run."""
+    """Results of the runs at one rate, one figure per run."""
 
     rate: float  # Hz
     c: list[float]  # us, p99.9
@@ -109,14 +109,14 @@ class Lateness:
 
     @property
     def goal(self) -> str:
-        """What is asked of the ratio, or why nothing can be."""
+        """Requirement on the ratio, or why there is none."""
         if self.c_spread > _SPREAD:
             return f"<= 1.2; not judged: C's own spread is {self.c_spread:.1f}"
         return "<= 1.2"
 
 
 def lateness(rate: float, rounds: int, seconds: float) -> Lateness:
-    """Let C, the loop, and the loop with recordings and dashboard run in turn."""
+    """Run C, the loop, and the loop with recordings and dashboard in turn; return the results."""
     found = Lateness(rate, [], [], [], [], [])
     with _compiled() as program:
         for _ in range(rounds):

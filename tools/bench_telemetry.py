@@ -1,4 +1,4 @@
-"""What telemetry costs the loop, and how it bears 10 kHz with everything on."""
+"""Time that telemetry costs the loop, and an endurance run at 10 kHz with all sinks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _RECORDS, _ROUNDS = 2000, 25
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """What a long run with everything on came to."""
+    """Result of a long run with all sinks."""
 
     rate: float  # Hz
     dropped: int  # periods
@@ -99,7 +99,7 @@ class _Memory(threading.Thread):
         self.resident_mb: list[float] = []
 
     def run(self) -> None:
-        """Look once a second."""
+        """Take a measurement once a second."""
         while not self.ended.wait(1.0):
             pid = self._session.telemetry_pid
             status = Path(f"/proc/{pid}/status")

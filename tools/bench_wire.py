@@ -1,4 +1,4 @@
-"""What the wire costs: encoding, a round trip to the native firmware, and a plain echo beside it."""
+"""Time that the wire costs: encoding, a round trip to the native firmware, and a plain echo."""
 
 from __future__ import annotations
 

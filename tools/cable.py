@@ -55,7 +55,7 @@ class Cable:
             self._thread.join()
 
     def pull(self) -> None:
-        """Let both lines go down, the device's first."""
+        """Disconnect both lines, the device's first."""
         if self._pulled:
             return
         self.loosen()

@@ -1,4 +1,4 @@
-"""How near healthy runs come to being ended for chatter: `make chatter`, 1,000 of them and the hard cases.
+"""Margin of healthy runs to the limit for chatter: `make chatter`, 1,000 runs and the hard cases.
 
 The figure of a run is the largest mean of |dV/dt| over half a second, over what the rig allows; the check
 objects to ten blocks of 50 ms in a row, so a run whose figure stays below 1 is never ended.

@@ -57,7 +57,7 @@ class Line:
 
     @property
     def right_percent(self) -> float:
-        """How often the cause was told right."""
+        """Share of runs whose cause was named correctly, %."""
         return 100.0 * self.right / self.runs
 
     def figures(self) -> dict[str, object]:

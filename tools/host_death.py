@@ -37,7 +37,7 @@ _HEAD = (
 
 
 class Death(NamedTuple):
-    """How one host ended, and what the device made of it; times by the firmware's clock."""
+    """End of one host, and the device's reaction; times by the firmware's clock."""
 
     way: str
     off_us: int  # from the deed to 0 V
@@ -69,7 +69,7 @@ class Death(NamedTuple):
 
 
 def die(way: str) -> Death:
-    """Let a real host drive a virtual device, part them, and look at both."""
+    """Run a real host with a virtual device, separate them, and return the result."""
     for tries in range(1, TRIES + 1):
         with ExitStack() as stack:
             device = stack.enter_context(VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()))

@@ -106,7 +106,7 @@ WAYS = {
 
 
 class Ending(NamedTuple):
-    """What a host did, and what the device made of it; times by the firmware's clock."""
+    """End of a host, and the device's reaction; times by the firmware's clock."""
 
     way: str
     off_us: int  # from the deed to 0 V
@@ -128,7 +128,7 @@ class Ending(NamedTuple):
 
     @property
     def own_gone_s(self) -> float:
-        """What its end took on a computer that had time for it, at least."""
+        """Time of the host's end without the waits of a busy computer, at least, s."""
         return self.gone_s - self.pressed_s
 
     @property
@@ -145,7 +145,7 @@ class Ending(NamedTuple):
 
 
 def end(name: str) -> Ending:
-    """Let a real host drive a virtual device, end it, and look at both."""
+    """Run a real host with a virtual device, end the host, and return the result."""
     for tries in range(1, TRIES + 1):
         with (
             tempfile.TemporaryDirectory() as place,

@@ -54,7 +54,7 @@ def is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
 
 
 def wait(holds: Callable[[], object], what: str, within_s: float = BOUND_S) -> None:
-    """Look every 2 ms until something holds.
+    """Poll every 2 ms until a condition holds.
 
     Raises
     ------

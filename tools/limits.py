@@ -62,7 +62,7 @@ def table(found: dict[Cell, list[Outcome]]) -> Iterable[str]:
 
 
 def beyond(found: dict[Cell, list[Outcome]]) -> list[str]:
-    """Say which attacks got through."""
+    """Return the attacks that exceeded a bound."""
     return [
         f"{cell.by} alone, {cell.limit:g} rad/s, {cell.kind}, seed {seed}: {outcome.speed:.3f} rad/s at 0 V"
         for cell, outcomes in found.items()
@@ -72,7 +72,7 @@ def beyond(found: dict[Cell, list[Outcome]]) -> list[str]:
 
 
 def stopped(verdicts: Sequence[Healthy]) -> list[str]:
-    """Say which healthy arms were stopped before they had passed a limit."""
+    """Return the healthy arms that were stopped before they had passed a limit."""
     return [f"healthy, seed {seed}: {one.reason}" for seed, one in enumerate(verdicts) if one.is_false]
 
 

@@ -42,7 +42,7 @@ def command(elf: Path, record_file: Path, host_fd: int, plant_fd: int) -> list[s
 
 
 class Outlet:
-    """Where bytes go: what its reader has no room for is lost, but for the rest of what has begun."""
+    """A destination of bytes: without room at the reader, all but a begun piece is lost."""
 
     def __init__(self, end: int) -> None:
         self._end, self._rest = end, b""

@@ -35,7 +35,7 @@ FIRST_PORT = 21_000  # tried for the viewer's remote control
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a viewer says about a recording that it has on the screen."""
+    """Report of a viewer on a displayed recording."""
 
     state: ViewerState
     logs: list[LogEntry]
@@ -48,7 +48,7 @@ class Seen:
 
 
 def _is_complaint(entry: LogEntry) -> bool:
-    """Tell what concerns the recording from what concerns a machine without a graphics card."""
+    """Return whether a report concerns the recording, and not a machine without a graphics card."""
     return entry.level in {"WARN", "ERROR"} and "Software rasterizer" not in entry.message
 
 

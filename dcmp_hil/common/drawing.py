@@ -15,7 +15,7 @@ _BACKEND = "MPLBACKEND"
 
 @contextmanager
 def files_only() -> Iterator[None]:
-    """Let Matplotlib be imported and used without its backend for windows, and without its log on a terminal.
+    """Allow Matplotlib's import and use without its backend for windows and its log on a terminal.
 
     Its import fails where MPLBACKEND names a backend that does not exist, and it logs on standard error that
     a home folder cannot be written, or that it looks for fonts.

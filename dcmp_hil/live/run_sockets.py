@@ -1,4 +1,4 @@
-"""Where the runs of this user listen: a socket each, in a folder that only this user may use."""
+"""Sockets of this user's runs, one each, in a folder that only this user may use."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _POLL_PERIOD_S = 0.002  # s
 
 
 class End(StrEnum):
-    """How a run ended after STOP."""
+    """Kinds of end of a run after STOP."""
 
     CONFIRMED = "confirmed"  # at 0 V for sure
     UNCONFIRMED = "unconfirmed"  # the run ended, and the device did not say that it is at 0 V
@@ -40,7 +40,7 @@ class End(StrEnum):
 
 
 class Stopped(NamedTuple):
-    """How a run ended after STOP: as a fixed word, and as a sentence."""
+    """Result of STOP: a fixed word, and a sentence."""
 
     end: End
     said: str

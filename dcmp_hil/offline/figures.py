@@ -32,7 +32,7 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Figures:
-    """What `--json` writes; the names are its keys. None is null: not there, or not defined."""
+    """Figures for `--json`; the names are its keys. None is null: not present, or not defined."""
 
     velocity_error_rms_rad_s: float
     """Observer's velocity against the reference."""

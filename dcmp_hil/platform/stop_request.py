@@ -99,7 +99,7 @@ class StopRequest:
             self._give_back()
 
     def wake(self, descriptor: int) -> None:
-        """Have the number of each signal written to `descriptor` at once, even during Python code."""
+        """Make Python write the number of each signal to `descriptor` at once."""
         if self._before and descriptor >= 0:
             self._woken = descriptor
             self._woken_before = signal.set_wakeup_fd(descriptor, warn_on_full_buffer=False)

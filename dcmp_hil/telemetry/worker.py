@@ -79,7 +79,7 @@ class Setup:
 
 
 class State(NamedTuple):
-    """How far the process has come, for the parent that has to go on in its place."""
+    """Progress of the process, from which its parent can continue in its place."""
 
     position: int  # of the ring
     dropped: int  # rows

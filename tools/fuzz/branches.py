@@ -20,7 +20,7 @@ UNREACHED: dict[str, str] = {}
 
 
 class Reach(NamedTuple):
-    """What was reached, of how many; and where not."""
+    """Branches reached, of how many, and those not reached."""
 
     lines: int
     all_lines: int

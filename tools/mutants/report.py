@@ -1,4 +1,4 @@
-"""What became of the mutants, against the names of those that may live."""
+"""Report on the mutants, compared with the names of those that may survive."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Trials:
         self.running = mmap.mmap(-1, 4)
 
     def pytest_configure(self) -> None:
-        """Have Hypothesis try the same examples each time; pytest wants to see it first, hence here."""
+        """Make Hypothesis use the same examples each time; here, since pytest must import it first."""
         from hypothesis import Phase, settings
 
         phases = [Phase.explicit, Phase.generate]

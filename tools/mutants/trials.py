@@ -34,7 +34,7 @@ SINGLE = {"OPENBLAS_NUM_THREADS": "1"}
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant: `tests`, `time`, `survived` or `dropped`, and by which test, or why."""
+    """Result for a mutant: `tests`, `time`, `survived` or `dropped`, and the test or the reason."""
 
     mutant: Mutant
     what: str

@@ -51,7 +51,7 @@ _POLL_S = 0.05
 
 
 def soak(minutes: float, speed: float, folder: Path, history: str, leak: float = 0.0) -> Soaked:
-    """Let data go through.
+    """Run data through telemetry; return the result.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ class Memory:
         self.peak_mb = max(self.peak_mb, total)
 
     def look_at_total(self, processes: dict[str, int]) -> None:
-        """Look at what they take in all, whatever waits in their queues."""
+        """Measure the memory of all processes together."""
         with suppress(OSError):
             self.peak_mb = max(self.peak_mb, sum(_smaps(pid)["Pss"] for pid in processes.values()))
 

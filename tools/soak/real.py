@@ -16,7 +16,7 @@ _POLL_S = 5.0
 
 
 def real(minutes: float, folder: Path) -> Soaked:
-    """Let `dcmp-hil run` run for so many minutes, and look at its processes."""
+    """Run `dcmp-hil run` for so many minutes, and measure its processes."""
     command = [sys.executable, "-m", "dcmp_hil", "run", "bench-1khz", "--duration", str(60.0 * minutes)]
     command += ["--viewer", "serve", "--json", "figures.json"]
     memory, cpu, began = Memory(), dict[str, float](), time.monotonic()

@@ -1,4 +1,4 @@
-"""What a soak came to, and what of it must not be."""
+"""Result of a soak, and the requirements that it violates."""
 
 from __future__ import annotations
 

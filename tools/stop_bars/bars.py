@@ -1,4 +1,4 @@
-"""What STOP is tried with, what one STOP came to, and the table of many."""
+"""Cases of STOP, the result of one STOP, and the table of many."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def _table(traces: dict[str, list[Step]]) -> str:
 
 
 def _changes(steps: list[Step]) -> str:
-    """Say when the state changed."""
+    """Return when the state changed."""
     tick, state, said = -1, "BOOT", []
     for step in steps:
         between = "tick" not in step

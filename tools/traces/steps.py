@@ -54,7 +54,7 @@ class Device(Protocol):
         ...
 
     def advance(self, us: int, /) -> None:
-        """Let time pass between two ticks."""
+        """Advance time between two ticks."""
         ...
 
     def link(self, up: bool, /) -> None:
@@ -158,7 +158,7 @@ class Recorder:
         self._send(ParameterSet(session, parameter, value), f"PARAMETER_SET {parameter.name} {value}")
 
     def wait(self, us: int) -> None:
-        """Let time pass between two ticks."""
+        """Advance time between two ticks."""
         self._play({"wait_us": us})
 
     def line(self, *, up: bool) -> None:

@@ -41,7 +41,7 @@ class Machine(NamedTuple):
 
 
 def missing() -> str:
-    """Say what this computer lacks and the command that gets it; empty if nothing."""
+    """Return what this computer lacks, and the command that installs it; empty if nothing."""
     if platform.machine() != "x86_64":
         return f"the machine with CAN shares this computer's programs: x86_64, not {platform.machine()}"
     absent = [tool for tool in (QEMU, "ip", "apt-get", "dpkg-deb") if shutil.which(tool) is None]

@@ -83,7 +83,7 @@ class CanLink:
 
     @property
     def corrupt(self) -> int:
-        """What arrived so far and was no frame: lines of slcan, error frames of socketcan and some others."""
+        """Number of corrupt frames so far: lines of slcan, error frames of socketcan and some others."""
         return self._bus.corrupt if isinstance(self._bus, SlcanBus) else self._corrupt
 
     @property
