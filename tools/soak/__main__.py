@@ -19,7 +19,9 @@ from tools.soak.real import real
 def main() -> None:
     """Run the soak, print its figures, and report violations."""
     parser = argparse.ArgumentParser(prog="python -m tools.soak", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=480.0, help="of simulated time")
+    parser.add_argument(
+        "--minutes", type=float, default=480.0, help="of simulated time; in less than 30 noise is a slope"
+    )
     parser.add_argument("--speed", type=float, default=200.0, help="times real time, at most")
     parser.add_argument(
         "--history", default="64MiB", help="that the dashboard's server keeps for late viewers"
