@@ -7,7 +7,7 @@ from dcmp_hil.cli.options import Overrides, RigName
 
 
 def check(rig: RigName, overrides: Overrides = None) -> None:
-    """Check a rig without running it: every fault at once, or every key with its value."""
+    """Check a rig without running it: print every fault at once, or every key with its value."""
     from rich.text import Text
 
     from dcmp_hil.config import load_rig

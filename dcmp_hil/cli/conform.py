@@ -60,10 +60,10 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     ] = None,
     link: Annotated[
         Carrier | None,
-        typer.Option(help="How frames travel; a serial port is listened to unless it is named."),
+        typer.Option(help="Carrier of the frames; by default found by listening to the serial port."),
     ] = None,
     interface: Annotated[
-        str, typer.Option(metavar="NAME", help="Of python-can, with --link can.")
+        str, typer.Option(metavar="NAME", help="Interface of python-can, with --link can.")
     ] = "socketcan",
     baud: Annotated[
         int, typer.Option(metavar="BIT_S", min=9600, max=12_000_000, help="Of a serial port.")
@@ -73,10 +73,10 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     ] = 1_000_000,
     node: Annotated[int, typer.Option(min=0, max=15, help="Number of the device on a shared bus.")] = 0,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="CHECK", help="Run this check alone. Repeatable.")
+        list[str] | None, typer.Option("--only", metavar="CHECK", help="Run only this check. Repeatable.")
     ] = None,
     arm: Annotated[
-        bool, typer.Option("--arm", help="Run what arms the device, too: the motor moves.")
+        bool, typer.Option("--arm", help="Also run the checks that arm the device: the motor moves.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="With --arm: do not ask again.")] = False,
     clear: Annotated[
@@ -86,10 +86,10 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     json_to: JsonFile = None,
     force: Force = False,
 ) -> None:
-    """Check that a device does what docs/protocol.md says, with messages of that page alone.
+    """Check a device against docs/protocol.md, with messages of that page only.
 
-    The device stays disarmed unless --arm is given, and is left disarmed at 0 V however this ends. Exit code:
-    0 if nothing contradicts the page, 1 if something does, 2 for a wrong option, 3 if there is no device or
+    The device stays disarmed unless --arm is given, and is disarmed at 0 V after every end. Exit code:
+    0 if the device agrees with the page, 1 if it does not, 2 for a wrong option, 3 if there is no device or
     the line broke, 130 after Ctrl-C.
     """
     from dcmp_hil.conformance.registry import CHECKS

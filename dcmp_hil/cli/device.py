@@ -39,16 +39,16 @@ class LinkName(StrEnum):
 def device(
     rig: RigName = _RIG,
     overrides: Overrides = None,
-    link: Annotated[LinkName, typer.Option(help="How frames travel on the port.")] = LinkName.COBS,
+    link: Annotated[LinkName, typer.Option(help="Carrier of the frames on the port.")] = LinkName.COBS,
     symlink: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="A path that leads to the port, for as long as it is there."),
+        typer.Option(metavar="PATH", help="Symbolic link to the port, while the device runs."),
     ] = None,
 ) -> None:
-    """Run a device without hardware: the firmware's C as a process, the simulated plant on its pins.
+    """Run a virtual device: the firmware's C code as a process, the simulated plant on its pins.
 
-    The first line on standard output is the port, which a host opens as if it were a serial one. Ctrl-C
-    ends it.
+    The first line on standard output is the port, which a host opens like a serial port. Ctrl-C
+    ends the device.
     """
     from dcmp_hil.config import load_rig
     from dcmp_hil.platform.clock import MonotonicClock

@@ -14,7 +14,9 @@ from dcmp_hil.errors import DcmpError
 if TYPE_CHECKING:
     from dcmp_hil.live.stop_command import Stopped
 
-Run = Annotated[int | None, typer.Option("--run", metavar="PID", help="Which run, where there are several.")]
+Run = Annotated[
+    int | None, typer.Option("--run", metavar="PID", help="Process id of the run, if there are several.")
+]
 
 
 def set_keys(
@@ -23,9 +25,9 @@ def set_keys(
     ],
     run: Run = None,
 ) -> None:
-    """Change gains or the reference of a run that goes on; the voltage has no step.
+    """Change gains or the reference of a running rig, without a step of the voltage.
 
-    It is checked as rig.toml is, applied between two cycles, and confirmed. Limits cannot be changed.
+    A change is checked like rig.toml, applied between two cycles, and confirmed. Limits cannot be changed.
     """
     from dcmp_hil.live.client import change, find_run
 
@@ -33,7 +35,7 @@ def set_keys(
 
 
 def stop(run: Run = None) -> None:
-    """End a run as Ctrl-C does: 0 V, and everything kept; by force where it does not answer.
+    """End a run as Ctrl-C does, at 0 V with all files kept; by force if it does not answer.
 
     Exit code: 0 if 0 V is confirmed, 3 if the run ended and its device did not confirm it, 7 if the run did
     not answer and was ended by force, 1 if it goes on.

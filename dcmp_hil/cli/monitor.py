@@ -14,13 +14,13 @@ def monitor(
     overrides: Overrides = None,
     duration: Annotated[float, typer.Option(metavar="S", help="Length, s; 0 = until Ctrl-C.")] = 0.0,
     all_frames: Annotated[
-        bool, typer.Option("--all", help="Every SAMPLE and DRIVE, not ten a second.")
+        bool, typer.Option("--all", help="Print every SAMPLE and DRIVE, not ten a second.")
     ] = False,
 ) -> None:
-    """Print what travels on a link, decoded, without taking part: no session, nothing is sent.
+    """Print the decoded traffic of a link; there is no session, and nothing is sent.
 
-    A serial port has one reader: while a run has it, this says so and ends. An slcan adapter that is closed
-    stays silent, for only a command opens it: let slcand do so, and watch its socketcan interface.
+    A serial port has one reader: while a run uses it, the command says so and ends. A closed slcan adapter
+    stays silent, because only a command opens it: open it with slcand, and monitor its socketcan interface.
     """
     from dcmp_hil.cli.execute_monitor import watch
     from dcmp_hil.config import load_rig

@@ -13,7 +13,7 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key, such as loop.rate_hz=500. Repeatable."),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Overwrite files that are there; never what is read.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite existing files, but never an input file.")]
 JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE", help="Write the figures as JSON; - for standard output."),

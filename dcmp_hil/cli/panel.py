@@ -15,16 +15,16 @@ def panel(
     port: Annotated[int, typer.Option(metavar="N", min=1, max=65535, help="Of 127.0.0.1.")] = 8710,
     run: Run = None,
     viewer: Annotated[
-        str, typer.Option(metavar="URL", help="A web viewer that runs already, shown in the page.")
+        str, typer.Option(metavar="URL", help="Address of a running web viewer, shown in the page.")
     ] = "",
     web: Annotated[
         bool, typer.Option("--web", help="Show the dashboard of a run with --viewer serve in the page.")
     ] = False,
 ) -> None:
-    """Serve a page for this machine's browser: gains, reference, what was applied, and STOP.
+    """Serve a page for this machine's browser: gains, reference, applied values, and STOP.
 
-    It finds the newest run by itself, and the next one when that has ended. Only a browser that has the
-    address that is printed, with its token, may use it.
+    The page finds the newest run, and the next one when that has ended. Only a browser that has the
+    printed address, with its token, may use it.
     """
     from dcmp_hil.errors import ConfigError
 

@@ -13,14 +13,14 @@ from dcmp_hil.errors import ConfigError
 
 
 def paper(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where figures 1 to 4 go.")] = Path("paper"),
-    no_figures: Annotated[bool, typer.Option("--no-figures", help="Only the table.")] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of figures 1 to 4.")] = Path("paper"),
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Print only the table.")] = False,
     json_file: JsonFile = None,
     force: Force = False,
 ) -> None:
-    """Reproduce the paper: figures 1 to 4, and what its printed equations cost.
+    """Reproduce the paper: figures 1 to 4, and the effect of its printed equations.
 
-    Exit code 1 if a corrected figure leaves its tolerance.
+    The exit code is 1 if a corrected figure is out of tolerance.
     """
     from dcmp_hil.cli.outputs import json_place, try_folder, try_places, write_each
     from dcmp_hil.cli.paper_view import misprint_table, reproduction_table

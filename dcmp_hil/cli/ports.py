@@ -13,7 +13,7 @@ from dcmp_hil.cli import console
 def ports(
     port: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PORT]...", help="Serial ports to look at besides, such as /dev/pts/3."),
+        typer.Argument(metavar="[PORT]...", help="Additional serial ports, such as /dev/pts/3."),
     ] = None,
     baud: Annotated[
         int, typer.Option(metavar="BIT_S", min=9600, max=12_000_000, help="Of serial ports.")
@@ -23,20 +23,22 @@ def ports(
     ] = 1_000_000,
     wait: Annotated[
         float,
-        typer.Option(metavar="S", min=0.1, max=60, help="For the first sample: some boards boot first."),
+        typer.Option(metavar="S", min=0.1, max=60, help="Wait for the first sample: some boards boot first."),
     ] = 0.25,
     verbose: Annotated[
         bool,
         typer.Option(
-            "--verbose", "-v", help="Say also how often each device booted, why, and its last fault."
+            "--verbose",
+            "-v",
+            help="Also print each device's number of boots, cause of reset, and last fault.",
         ),
     ] = False,
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
-    It listens first and writes nothing, and asks only where a device of this project is heard. An slcan
-    adapter that is closed stays silent, for only a command opens it: a run does, and slcand. A CAN adapter
-    that is opened takes part in its bus: name the right --bitrate.
+    The command listens first, and asks only if it receives a device of this project. A closed slcan
+    adapter stays silent, because only a command opens it: `run` and slcand do so. An open CAN adapter
+    takes part in its bus: give the right --bitrate.
     """
     from rich.text import Text
 

@@ -70,7 +70,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     ] = None,
     no_input: Annotated[
         bool,
-        typer.Option("--no-input", help="Nothing was applied: the arm swung freely.", rich_help_panel=_FILE),
+        typer.Option("--no-input", help="There was no input: the arm swung freely.", rich_help_panel=_FILE),
     ] = False,
     modulus: Annotated[
         str | None,
@@ -158,33 +158,33 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     csv: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Default: <FILE>-replay.csv here; of a run none.", rich_help_panel=_OUTPUT
+            metavar="FILE", help="Default: <FILE>-replay.csv here; none for a run.", rich_help_panel=_OUTPUT
         ),
     ] = None,
     rrd: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Default: <FILE>-replay.rrd here; of a run none.", rich_help_panel=_OUTPUT
+            metavar="FILE", help="Default: <FILE>-replay.rrd here; none for a run.", rich_help_panel=_OUTPUT
         ),
     ] = None,
     no_write: Annotated[
-        bool, typer.Option("--no-write", help="Write only the files named.", rich_help_panel=_OUTPUT)
+        bool, typer.Option("--no-write", help="Write only the named files.", rich_help_panel=_OUTPUT)
     ] = False,
     force: Force = False,
     trust: Annotated[
         bool,
         typer.Option(
             "--trust",
-            help="Import the classes, and read the files, that the rig in a recording names: its code runs.",
+            help="Import the classes and read the files that the rig in a recording names; its code runs.",
             rich_help_panel=_OBSERVER,
         ),
     ] = False,
 ) -> None:
     """Run an observer over a recording and judge its velocity by a zero-phase reference.
 
-    Uneven sampling and lost samples are fine: every step takes the measured time. Columns are found by name
-    (time, position, torque ...), units by the name's end (position_deg); options say what names do not.
-    A run of dcmp-hil goes through its observer and controller again, with other gains if you name some.
+    Uneven sampling and lost samples are allowed: each step has its measured length. Columns are found by name
+    (time, position, torque ...), units by the end of a name (position_deg); options replace missing names.
+    For a run of dcmp-hil, its observer and controller run again, with other gains if you give some.
     """
     from dcmp_hil.cli import execute_replay
     from dcmp_hil.cli.replay_options import Given

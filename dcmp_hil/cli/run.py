@@ -28,9 +28,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     duration: Annotated[
         float | None, typer.Option("--duration", metavar="S", help="Length, s; 0 = until Ctrl-C.")
     ] = None,
-    window_from: Annotated[
-        float, typer.Option("--from", metavar="S", help="The figures count from this time on, s.")
-    ] = 0.0,
+    window_from: Annotated[float, typer.Option("--from", metavar="S", help="Start of the figures, s.")] = 0.0,
     fast: Annotated[
         bool, typer.Option("--fast", help="Virtual time: as fast as it computes (simulated rig).")
     ] = False,
@@ -43,17 +41,17 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.rrd", help="Where the recording goes, instead of the run's folder."),
+        typer.Option(metavar="FILE.rrd", help="Path of the recording, instead of the run's folder."),
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no folder under runs/.")] = False,
     json_file: JsonFile = None,
-    note: Annotated[str, typer.Option(metavar="TEXT", help="Kept with the run's figures.")] = "",
+    note: Annotated[str, typer.Option(metavar="TEXT", help="Text that is kept with the run's figures.")] = "",
     faults: Annotated[
         list[str] | None,
         typer.Option(
             "--fault",
             metavar="KIND[:KEY=VALUE,...]",
-            help="Let something go wrong, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
+            help="Inject a fault, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
         ),
     ] = None,
     clear: Annotated[
@@ -61,7 +59,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         typer.Option(
             "--clear",
             help="Clear a fault of the device that waits for a person: STOP by a person, the amplifier's own "
-            "protection, what the board found wrong with itself.",
+            "protection, an internal fault of the board.",
         ),
     ] = False,
     no_control: Annotated[
@@ -71,7 +69,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
 ) -> None:
     """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
 
-    Ctrl-C ends it at 0 V and keeps what was recorded.
+    Ctrl-C ends the run at 0 V and keeps the recording.
     """
     from dcmp_hil.cli.execute_run import Options, execute
 
