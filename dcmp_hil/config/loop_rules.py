@@ -19,7 +19,7 @@ from dcmp_hil.safety.chatter import FLOOR_V_S
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.config.rig import Rig
+    from dcmp_hil.config.tables import RigTables
 
 _MOTOR_GAIN_RATIO_MIN = 0.8  # times the believed motor gain, for which the loop must be stable
 _MOTOR_GAIN_RATIO_MAX = 1.25  # the same, upper bound
@@ -46,18 +46,18 @@ _GAIN_KEYS = (
 )
 
 
-def gains_hold(rig: Rig) -> str:
+def gains_hold(rig: RigTables) -> str:
     """Refuse gains with which the loop runs away, or shakes the motor with the encoder's own steps."""
     fault = _fault(rig)
     return f"{_blamed(rig)} {fault()}" if fault else ""
 
 
-def holds(rig: Rig) -> bool:
+def holds(rig: RigTables) -> bool:
     """Return whether `gains_hold` finds nothing wrong."""
     return _fault(rig) is None
 
 
-def loops(rig: Rig) -> list[LinearLoop]:
+def loops(rig: RigTables) -> list[LinearLoop]:
     """Return the linear loop at every bandwidth that the observer has; empty for classes of one's own."""
     if not (isinstance(rig.controller, PdSettings) and isinstance(rig.observer, SuperTwistingSettings)):
         return []
@@ -67,7 +67,7 @@ def loops(rig: Rig) -> list[LinearLoop]:
     return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
 
 
-def _fault(rig: Rig) -> Callable[[], str] | None:
+def _fault(rig: RigTables) -> Callable[[], str] | None:
     """Return a function that describes the fault, None without one; only it computes the margins."""
     if rig.supervisor.monitors != "all":
         return None
@@ -100,7 +100,7 @@ def _rough(loop: LinearLoop, limit: float) -> str:
     return ""
 
 
-def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
+def _slow_fault(rig: RigTables, observer: SuperTwistingSettings) -> str:
     """Return a fault if the differentiator cannot follow gravity: neither by its floor nor by its slope."""
     tuning = observer.tuning(ObserverContext(rig.model.values(), rig.period, rig.encoder.counts))
     fastest = rig.model.gravity_rad_s2 * rig.supervisor.velocity_limit_rad_s
@@ -114,7 +114,7 @@ def _slow_fault(rig: Rig, observer: SuperTwistingSettings) -> str:
     )
 
 
-def _euler_fault(rig: Rig, observer: PaperSettings) -> str:
+def _euler_fault(rig: RigTables, observer: PaperSettings) -> str:
     """Return a fault if the paper's explicit Euler steps diverge, or oscillate by more than the arm does."""
     step, count = rig.period, rig.encoder.count
     copy = np.array([[-observer.L1_1_s, 1.0], [-observer.L2_1_s2, -rig.model.f0_1_s]])
@@ -170,7 +170,7 @@ def _told(fault: str, loop: LinearLoop) -> str:
     )
 
 
-def _blamed(rig: Rig) -> str:
+def _blamed(rig: RigTables) -> str:
     """Return the key that alone makes the difference; else the proportional gain."""
     for table, name in _GAIN_KEYS:
         section = getattr(rig, table)

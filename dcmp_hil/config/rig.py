@@ -2,171 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Any, Self, get_args
 
-from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import Discriminator, model_validator
 
-from dcmp_hil.common.section import Section
-from dcmp_hil.config.backends import Can, CustomBackend, Serial, Sim, SimBoard
 from dcmp_hil.config.rules import RULES
-from dcmp_hil.config.sections import (
-    AmplifierSection,
-    Custom,
-    CustomController,
-    EncoderSection,
-    LoopSection,
-    ModelSection,
-    RunSection,
-    SimSection,
-    SupervisorSection,
-    TimingSection,
-)
-from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.paper import PaperSettings
-from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.control.references.periodic import Chirp, Sine
-from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
-from dcmp_hil.control.references.table import Table
+from dcmp_hil.config.tables import RigTables
 
 if TYPE_CHECKING:
-    from dcmp_hil.control.model import Model
-
-_OF_ALL, _OF_SPARE, _OF_MOTOR = 0.85, 0.7, 0.25  # of all the motor has; of what is left; at least, of all
-_COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there
+    from dcmp_hil.common.section import Section
 
 
-def _kind_or_custom(default: str) -> Discriminator:
-    def kind(value: Any) -> str:
-        got = value.get("kind", default) if isinstance(value, dict) else getattr(value, "kind", default)
-        return "custom" if ":" in str(got) else str(got)
-
-    return Discriminator(kind)
-
-
-BackendSection = Annotated[
-    Annotated[Sim, Tag("sim")]
-    | Annotated[SimBoard, Tag("sim-board")]
-    | Annotated[Serial, Tag("serial")]
-    | Annotated[Can, Tag("can")]
-    | Annotated[CustomBackend, Tag("custom")],
-    _kind_or_custom("sim"),
-]
-ObserverSection = Annotated[
-    Annotated[SuperTwistingSettings, Tag("super_twisting")]
-    | Annotated[PaperSettings, Tag("paper")]
-    | Annotated[Custom, Tag("custom")],
-    _kind_or_custom("super_twisting"),
-]
-ControllerSection = Annotated[
-    Annotated[PdSettings, Tag("pd_compensated")]
-    | Annotated[PdSettings, Tag("pd")]
-    | Annotated[CustomController, Tag("custom")],
-    _kind_or_custom("pd_compensated"),
-]
-ReferenceSection = Annotated[
-    Annotated[Sine, Tag("sine")]
-    | Annotated[Chirp, Tag("chirp")]
-    | Annotated[Hold, Tag("hold")]
-    | Annotated[Step, Tag("step")]
-    | Annotated[Trapezoid, Tag("trapezoid")]
-    | Annotated[Table, Tag("csv")],
-    _kind_or_custom("sine"),
-]
-
-
-class Rig(Section):
+class Rig(RigTables):
     """Settings of one rig and of its run."""
 
-    name: str = Field(default="rig", max_length=60, pattern=r"^\w[\w.-]*$", examples=["my-rig"])
-    """What the run's folder and the dashboard call it: up to 60 letters, digits, and . _ - inside."""
-    loop: LoopSection = LoopSection()
-    backend: BackendSection = Sim()
-    encoder: EncoderSection = EncoderSection()
-    amplifier: AmplifierSection = AmplifierSection()
-    model: ModelSection = ModelSection()
-    observer: ObserverSection = SuperTwistingSettings()
-    controller: ControllerSection = PdSettings()
-    reference: ReferenceSection = Sine()
-    supervisor: SupervisorSection = SupervisorSection()
-    timing: TimingSection = TimingSection()
-    run: RunSection = RunSection()
-    sim: SimSection = SimSection()
-
-    _folder: Path | None = PrivateAttr(default=None)
-
-    @property
-    def folder(self) -> Path | None:
-        """The folder of the rig's file; None for a shipped rig."""
-        return self._folder
-
-    def in_folder(self, folder: Path | None) -> Rig:
-        """Return the same rig as from a file in that folder."""
-        rig = self.model_copy()
-        rig._folder = folder  # noqa: SLF001 - its own
-        return rig
-
-    @property
-    def plugin_folders(self) -> tuple[Path, ...]:
-        """Folders in which a `module:Class` is searched, besides installed packages."""
-        return (Path(),) if self._folder is None else (self._folder, Path())
-
-    @property
-    def period(self) -> float:
-        """Nominal period, s."""
-        return 1.0 / self.loop.rate_hz
-
-    @property
-    def delay(self) -> float:
-        """From a sample to the instant at which its command acts, s."""
-        return self.loop.delay_samples * self.period
-
-    @property
-    def plant(self) -> Model:
-        """The simulated plant: `[model]` where `[sim.plant]` says nothing else."""
-        changed = self.sim.plant.model_dump(exclude_unset=True)
-        return self.model.model_copy(update=changed).values()
-
-    @property
-    def plant_steps(self) -> int:
-        """Steps of the simulated plant in a period."""
-        if self.sim.step_us == "auto":
-            return math.ceil(self.period / _COARSEST_STEP - 1e-9)
-        return max(1, round(self.period / (self.sim.step_us * 1e-6)))
-
-    @property
-    def reference_accelerations(self) -> tuple[float, float]:
-        """Return the accelerations of a reference and of a stop, rad/s2; infinite without a limit.
-
-        Gravity helps at the ends of a swing; a stop has it against itself. Both leave the controller room.
-        """
-        model, motor = self.model, self.model.ku_rad_s2_V * self.amplifier.limit
-        pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
-        spare = max(_OF_SPARE * (motor - pushed - model.gravity_rad_s2), _OF_MOTOR * motor)
-        return max(_OF_ALL * motor - pushed, spare), spare
-
-    @property
-    def impossible_on_a_wire(self) -> list[str]:
-        """Return the settings that no device supports, not even a simulated one."""
-        ideal = (
-            ('encoder.counts_per_rev = "ideal"', self.encoder.counts is None),
-            ('amplifier.voltage_limit_V = "none"', math.isinf(self.amplifier.limit)),
-            ("loop.delay_samples = 0", self.loop.delay_samples == 0),
-        )
-        return [setting for setting, found in ideal if found]
-
-    @property
-    def simulation_only(self) -> list[str]:
-        """Return the settings that are allowed in a simulation only."""
-        loose = (
-            ('supervisor.monitors = "finite"', self.supervisor.monitors == "finite"),
-            ('supervisor.start = "immediate"', self.supervisor.start == "immediate"),
-        )
-        return self.impossible_on_a_wire + [setting for setting, found in loose if found]
-
     @model_validator(mode="after")
-    def _check_rules(self) -> Rig:
+    def _check_rules(self) -> Self:
         faults = [fault for rule in RULES if (fault := rule(self))]
         if faults:
             raise ValueError("\n".join(faults))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from dcmp_hil.common.section import Section
-    from dcmp_hil.config.rig import Rig
+    from dcmp_hil.config.tables import RigTables
 
 _COARSEST_ENCODER = 256  # counts a revolution
 _LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
@@ -34,7 +34,7 @@ _PLAUSIBLE_MAX = {  # by unit: the largest plausible value
 }
 
 
-def _step_divides_period(rig: Rig) -> str:
+def _step_divides_period(rig: RigTables) -> str:
     if rig.sim.step_us == "auto":
         return ""
     steps = rig.period / (rig.sim.step_us * 1e-6)
@@ -48,7 +48,7 @@ def _step_divides_period(rig: Rig) -> str:
     )
 
 
-def _floor_below_rate(rig: Rig) -> str:
+def _floor_below_rate(rig: RigTables) -> str:
     mu0 = getattr(rig.observer, "mu0_rad_s", None)
     if mu0 is None or mu0 * rig.period <= 0.3 + 1e-9:
         return ""
@@ -59,7 +59,7 @@ def _floor_below_rate(rig: Rig) -> str:
     )
 
 
-def _simulation_only(rig: Rig) -> str:
+def _simulation_only(rig: RigTables) -> str:
     kind = rig.backend.kind
     if not rig.backend.device:
         return ""  # a module:Factory says for itself whether it is a simulation, when it is opened
@@ -72,7 +72,7 @@ def _simulation_only(rig: Rig) -> str:
     )
 
 
-def _whole_units(rig: Rig) -> str:
+def _whole_units(rig: RigTables) -> str:
     """Refuse what a device cannot say in whole numbers."""
     if not rig.backend.device:
         return ""
@@ -91,7 +91,7 @@ def _whole_units(rig: Rig) -> str:
     return "\n".join(faults)
 
 
-def _link_carries_rate(rig: Rig) -> str:
+def _link_carries_rate(rig: RigTables) -> str:
     capacity = rig.backend.capacity
     if capacity is None or capacity.bits_per_period * rig.loop.rate_hz <= capacity.bits_per_second:
         return ""
@@ -103,7 +103,7 @@ def _link_carries_rate(rig: Rig) -> str:
     )
 
 
-def _encoder_shows_faults(rig: Rig) -> str:
+def _encoder_shows_faults(rig: RigTables) -> str:
     """Refuse an encoder so coarse that a fault of it is found too late; see docs/safety.md."""
     counts = rig.encoder.counts
     if counts is None or counts >= _COARSEST_ENCODER or rig.supervisor.monitors != "all":
@@ -115,7 +115,7 @@ def _encoder_shows_faults(rig: Rig) -> str:
     )
 
 
-def _limits_leave_room(rig: Rig) -> str:
+def _limits_leave_room(rig: RigTables) -> str:
     """Refuse limits that the start alone would pass: the probe's two pushes, and an arm that swings back."""
     limits = rig.supervisor
     if limits.monitors != "all":
@@ -136,7 +136,7 @@ def _limits_leave_room(rig: Rig) -> str:
     return "\n".join(faults)
 
 
-def _limits_can_be_kept(rig: Rig) -> str:
+def _limits_can_be_kept(rig: RigTables) -> str:
     """Refuse limits that the encoder does not show; see docs/safety.md."""
     limits, count = rig.supervisor, rig.encoder.count
     if limits.monitors != "all":
@@ -159,7 +159,7 @@ def _limits_can_be_kept(rig: Rig) -> str:
     return "\n".join(faults)
 
 
-def _way_to_0_V(rig: Rig) -> float:
+def _way_to_0_V(rig: RigTables) -> float:
     """Return how far the arm goes from the sample that shows a limit passed until the voltage is 0, rad.
 
     At the velocity limit, or as fast as the motor and gravity can make it within a travel of that length.
@@ -174,7 +174,7 @@ def _rounded_up(value: float) -> float:
     return math.ceil(1e3 * value - 1e-6) / 1e3
 
 
-def _motor_holds(rig: Rig) -> str:
+def _motor_holds(rig: RigTables) -> str:
     """Refuse a motor that what pushes all the time carries away."""
     model, motor = rig.model, rig.model.ku_rad_s2_V * rig.amplifier.limit
     pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
@@ -187,7 +187,7 @@ def _motor_holds(rig: Rig) -> str:
     )
 
 
-def _supply_gives_limit(rig: Rig) -> str:
+def _supply_gives_limit(rig: RigTables) -> str:
     limit, supply = rig.amplifier.limit, 1e-3 * rig.amplifier.supply_mV
     if supply == 0.0 or math.isinf(limit) or limit <= supply:
         return ""
@@ -197,7 +197,7 @@ def _supply_gives_limit(rig: Rig) -> str:
     )
 
 
-def _within_reason(rig: Rig) -> str:
+def _within_reason(rig: RigTables) -> str:
     """Refuse what only a wrong unit explains, in the tables that do not say how large their keys may be."""
     sections: dict[str, Section] = {
         "observer": rig.observer,
@@ -236,7 +236,7 @@ def _beyond_reason(name: str, section: Section) -> Iterator[str]:
         )
 
 
-RULES: tuple[Callable[[Rig], str], ...] = (
+RULES: tuple[Callable[[RigTables], str], ...] = (
     _within_reason,
     _step_divides_period,
     _floor_below_rate,

@@ -6,17 +6,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dcmp_hil.conformance.terms import CARRIERS
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from dcmp_hil.conformance.client import Client
-
-COBS, SLCAN, CAN = "cobs", "slcan", "can"
-CARRIERS = (COBS, SLCAN, CAN)
-
-
-class NotJudgedError(Exception):
-    """A check cannot judge this device now: the reason."""
 
 
 class Verdict(StrEnum):

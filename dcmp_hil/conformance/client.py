@@ -5,8 +5,8 @@ from __future__ import annotations
 import secrets
 from typing import TYPE_CHECKING, TypeVar
 
-from dcmp_hil.conformance.check import NotJudgedError
 from dcmp_hil.conformance.listener import Listener
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import (
     Drive,

@@ -6,7 +6,7 @@ import select
 from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
-from dcmp_hil.conformance.check import CAN, COBS, SLCAN
+from dcmp_hil.conformance.terms import CAN, COBS, SLCAN
 from dcmp_hil.device.links.can import CanLink
 from dcmp_hil.device.links.port_errors import reason
 from dcmp_hil.device.links.serial import FAILURES, open_port, path_of, write_now

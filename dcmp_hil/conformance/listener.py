@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.conformance.check import CAN
+from dcmp_hil.conformance.terms import CAN
 from dcmp_hil.errors import SampleTimeoutError
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.counters import nearest

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.backends import Can
-from dcmp_hil.conformance.check import CAN, COBS, SLCAN
 from dcmp_hil.conformance.lines import CanLine, CobsLine, SerialPort, SlcanLine
+from dcmp_hil.conformance.terms import CAN, COBS, SLCAN
 from dcmp_hil.device.links.serial import path_of
 from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan

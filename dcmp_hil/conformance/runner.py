@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import NotJudgedError, Outcome, Verdict
+from dcmp_hil.conformance.check import Outcome, Verdict
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.errors import BackendError, OpenError, SampleTimeoutError
 from dcmp_hil.wire.messages import State

@@ -6,9 +6,10 @@ import struct
 from binascii import crc_hqx
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import COBS, SLCAN, Check
+from dcmp_hil.conformance.check import Check
 from dcmp_hil.conformance.checks.frames import FULL
 from dcmp_hil.conformance.lines import CobsLine, SlcanLine
+from dcmp_hil.conformance.terms import COBS, SLCAN
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Hello, Identity, State, Stop

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.wire.messages import Drive, State
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, SampleReport, State
 

@@ -6,8 +6,9 @@ import statistics
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.conformance.check import Check
 from dcmp_hil.conformance.checks.running import PUSH_MV, lower
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import FaultReport, Parameter, State

@@ -5,9 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.conformance.check import Check
 from dcmp_hil.conformance.checks.arming import LOW_MV, run
 from dcmp_hil.conformance.checks.drives import ROOM
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, Parameter, Result, State
 

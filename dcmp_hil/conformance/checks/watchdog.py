@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check, NotJudgedError
+from dcmp_hil.conformance.check import Check
 from dcmp_hil.conformance.checks.arming import LOW_MV, run
 from dcmp_hil.conformance.checks.running import lower
+from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Hello, Parameter, State
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
