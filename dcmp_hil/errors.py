@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dcmp_hil.result import Result
     from dcmp_hil.values import Cycle
 
 
@@ -21,7 +20,7 @@ class DcmpError(Exception):
     """
 
     exit_code: ClassVar[int] = 1
-    result: Result | None = None
+    result: Any = None  # a `dcmp_hil.Result`, whose module is above this one
 
 
 class ConfigError(DcmpError):

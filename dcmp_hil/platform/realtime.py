@@ -17,7 +17,7 @@ import sys
 import threading
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, Self
 
 from dcmp_hil.errors import DeadlineError
 from dcmp_hil.platform.host_info import privileges
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType, TracebackType
 
-    from dcmp_hil.config.sections import TimingSection
 
 _HELPER_PRIORITY = 1  # the lowest real-time priority
 _RUN_WITHOUT_SLEEP_MAX_US = 80_000
@@ -64,11 +63,35 @@ class Grant:
         return not self.refusal
 
 
+class RealtimeSettings(Protocol):
+    """What a run asks of the operating system, as `[timing]` of rig.toml has it."""
+
+    @property
+    def realtime(self) -> Literal["try", "enforce", "off"]:
+        """Whether to ask, and whether to insist."""
+        ...
+
+    @property
+    def priority(self) -> int:
+        """SCHED_FIFO priority of the loop."""
+        ...
+
+    @property
+    def cpu(self) -> int | Literal["any"]:
+        """Number of the CPU of the loop."""
+        ...
+
+    @property
+    def switch_interval_us(self) -> int:
+        """Switch interval of Python's threads, us."""
+        ...
+
+
 class _Wish(NamedTuple):
     """One request to the operating system, before it is made."""
 
     what: str
-    take: Callable[[TimingSection, ExitStack], None]  # OSError if refused; pushes how to undo it
+    take: Callable[[RealtimeSettings, ExitStack], None]  # OSError if refused; pushes how to undo it
     remedy: str
     matters: bool  # to "enforce"
 
@@ -90,7 +113,7 @@ class RealTime:
         What was asked for and what came of it, once entered.
     """
 
-    def __init__(self, timing: TimingSection) -> None:
+    def __init__(self, timing: RealtimeSettings) -> None:
         self._timing = timing
         self._undo = ExitStack()
         self.grants: list[Grant] = []
@@ -133,7 +156,7 @@ class RealTime:
         )
 
 
-def _wishes(timing: TimingSection) -> list[_Wish]:
+def _wishes(timing: RealtimeSettings) -> list[_Wish]:
     pinned = [_Wish(f"CPU {timing.cpu}", _pin, _CPU, matters=True)] if timing.cpu != "any" else []
     return [
         _Wish("collector off", _quiet_collector, "", matters=False),
@@ -145,7 +168,7 @@ def _wishes(timing: TimingSection) -> list[_Wish]:
     ]
 
 
-def _ask(wish: _Wish, timing: TimingSection, undo: ExitStack) -> Grant:
+def _ask(wish: _Wish, timing: RealtimeSettings, undo: ExitStack) -> Grant:
     try:
         wish.take(timing, undo)
     except OSError as error:
@@ -169,7 +192,7 @@ def _insist(wishes: list[_Wish], grants: list[Grant]) -> None:
 # ---------------------------------------------------------------- one function a wish
 
 
-def _quiet_collector(timing: TimingSection, undo: ExitStack) -> None:  # noqa: ARG001 - all are called alike
+def _quiet_collector(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: ARG001 - all are called alike
     """Make no pause for garbage: what is there now is never looked at again, and no collection begins."""
     was_on = gc.isenabled()
     gc.collect()
@@ -180,19 +203,19 @@ def _quiet_collector(timing: TimingSection, undo: ExitStack) -> None:  # noqa: A
         undo.callback(gc.enable)
 
 
-def _switch_sooner(timing: TimingSection, undo: ExitStack) -> None:
+def _switch_sooner(timing: RealtimeSettings, undo: ExitStack) -> None:
     """Bound the time for which another thread holds the interpreter lock while the loop waits for it."""
     undo.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(1e-6 * timing.switch_interval_us)
 
 
-def _sharpen_timer(timing: TimingSection, undo: ExitStack) -> None:  # noqa: ARG001
+def _sharpen_timer(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: ARG001
     """Set the timer slack so that a normal thread wakes on time, not 50 us later, as with SCHED_FIFO."""
     _call_libc("prctl", _TIMER_SLACK, 1, 0, 0, 0)
     undo.callback(_call_libc, "prctl", _TIMER_SLACK, _USUAL_SLACK, 0, 0, 0)
 
 
-def _lock_memory(timing: TimingSection, undo: ExitStack) -> None:  # noqa: ARG001
+def _lock_memory(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: ARG001
     """Keep our pages in memory, each from its first touch on, so that stacks do not cost their whole size."""
     held = privileges()
     for_ever = held["cap_ipc_lock"] or held["memlock_limit"] == "unlimited"
@@ -201,14 +224,14 @@ def _lock_memory(timing: TimingSection, undo: ExitStack) -> None:  # noqa: ARG00
     undo.callback(_call_libc, "munlockall")
 
 
-def _pin(timing: TimingSection, undo: ExitStack) -> None:
+def _pin(timing: RealtimeSettings, undo: ExitStack) -> None:
     """Pin the loop's thread alone: the others would be in its way there."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {int(timing.cpu)})
     undo.callback(os.sched_setaffinity, 0, before)
 
 
-def _be_first(timing: TimingSection, undo: ExitStack) -> None:
+def _be_first(timing: RealtimeSettings, undo: ExitStack) -> None:
     """Give the loop the highest priority, and our other threads one above every normal program.
 
     Without the latter a thread that holds the interpreter lock could lose its CPU to such a program, and the

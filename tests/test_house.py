@@ -1,0 +1,82 @@
+"""The shape of the packages: short modules, no circle of imports, no heavy library behind the loop."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_ROOT = Path(__file__).parents[1]
+_RUN = {"__init__", "__main__", "api", "assembly", "fault_injection", "loop", "result", "session"}
+_SHARED_WORDS = {"backend", "errors", "stop", "values"}
+_HEAVY = {"can", "numpy", "pydantic", "rerun", "serial"}
+
+
+@cache
+def _modules() -> dict[str, ast.Module]:
+    """Return every module of the two packages, parsed, by its dotted name."""
+    files = [file for package in ("dcmp_hil", "sim_backend") for file in (_ROOT / package).rglob("*.py")]
+    return {_name_of(file): ast.parse(file.read_text("utf-8")) for file in files}
+
+
+def _name_of(file: Path) -> str:
+    return ".".join(file.relative_to(_ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def _nodes(node: ast.AST, *, types: bool) -> Iterator[ast.AST]:
+    """Yield all nodes, also in functions; without `types` none that only the type checker reads."""
+    for child in ast.iter_child_nodes(node):
+        if types or not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+            yield child
+            yield from _nodes(child, types=types)
+
+
+def _imports_of(tree: ast.Module, *, types: bool = True) -> set[str]:
+    """Return what a module imports: modules of the packages in full, others by their first name."""
+    found: set[str] = set()
+    for node in _nodes(tree, types=types):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names} & _modules().keys()
+            found |= inner or {node.module}
+    return {name if name in _modules() else name.partition(".")[0] for name in found}
+
+
+def test_no_module_imports_itself_by_a_detour() -> None:
+    graph = {name: _imports_of(tree) & _modules().keys() for name, tree in _modules().items()}
+    assert sum(map(len, graph.values())) > 1000
+    TopologicalSorter(graph).prepare()  # raises CycleError, with the circle
+
+
+def test_beside_the_rooms_are_one_run_and_the_words_that_all_share() -> None:
+    assert {file.stem for file in (_ROOT / "dcmp_hil").glob("*.py")} == _RUN | _SHARED_WORDS
+
+
+def test_no_heavy_library_stands_behind_the_loop_not_even_in_a_function() -> None:
+    reached, ahead = set[str](), {"dcmp_hil.loop"}
+    while ahead:
+        name = ahead.pop()
+        reached.add(name)
+        if name in _modules():
+            packages = {name.rsplit(".", depth)[0] for depth in range(1, name.count(".") + 1)}
+            ahead |= (_imports_of(_modules()[name], types=False) | packages) - reached
+    assert {"dcmp_hil.safety.supervisor", "dcmp_hil.values"} <= reached
+    assert reached & _HEAVY == set()
+
+
+def test_loop_is_imported_without_a_heavy_library() -> None:
+    code = "import sys, dcmp_hil.loop; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    loaded = set(done.stdout.split())
+    assert "dcmp_hil.loop" in loaded
+    assert loaded & _HEAVY == set()
