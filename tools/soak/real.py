@@ -9,10 +9,14 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from dcmp_hil.live import control
+from dcmp_hil.telemetry import worker
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 
 _POLL_S = 5.0
+_PROGRAMS = {worker.__name__: "telemetry process", control.__name__: "control process"}
+"""Module that a child of a run imports, to what it is called."""
 
 
 def real(minutes: float, folder: Path) -> Soaked:
@@ -31,6 +35,7 @@ def real(minutes: float, folder: Path) -> Soaked:
     figures = json.loads((folder / "figures.json").read_text("utf-8"))
     (kept,) = (folder / "runs").iterdir()
     troubles = [f"it ended with exit code {process.returncode}"] if process.returncode else []
+    troubles += [f"{name}: never seen" for name in _PROGRAMS.values() if name not in memory.growth]
     return Soaked(
         minutes, time.monotonic() - began, cpu, memory, figures["dropped_periods"],
         periods_in(kept / "run.mcap"), figures["periods"], size_mb(kept / "run.mcap"),
@@ -44,5 +49,5 @@ def _processes(run: int) -> dict[str, int]:
     with suppress(OSError):
         for pid in map(int, Path(f"/proc/{run}/task/{run}/children").read_text("ascii").split()):
             command = Path(f"/proc/{pid}/cmdline").read_bytes()
-            found["telemetry process" if b"telemetry.child" in command else "control process"] = pid
+            found.update({name: pid for module, name in _PROGRAMS.items() if module.encode() in command})
     return found

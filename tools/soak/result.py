@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -50,7 +51,7 @@ class Soaked:
     def faults(self) -> list[str]:
         """Return the requirements that the soak violates."""
         found = [
-            f"{name}: grows by {growth.slope():.3f} MB a simulated minute"
+            f"{name}: {_grows_by(growth.slope())}"
             for name, growth in self.memory.growth.items()
             if not growth.slope() < SLOPE_MB
         ]
@@ -72,6 +73,12 @@ class Soaked:
             "mcap_mb_a_minute": self.mcap_mb / self.minutes,
             "rrd_mb_a_minute": self.rrd_mb / self.minutes,
         }
+
+
+def _grows_by(slope: float) -> str:
+    if math.isnan(slope):
+        return "no two minutes after the warm-up, so its growth is not known"
+    return f"grows by {slope:.3f} MB a simulated minute"
 
 
 def size_mb(file: Path) -> float:
