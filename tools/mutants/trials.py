@@ -24,7 +24,7 @@ _STATE = (
     *("amplifier", "drive", "encoder_speed", "encoder_travel", "encoder_jumps", "encoder_state"),
     *("memory", "sessions", "supervisor", "watchdog"),
 )
-_AROUND = ("app", "latched", "parameters", "records", "reports", "rings")
+_AROUND = ("app", "boot_count", "latched", "parameters", "records", "reports", "rings")
 TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 

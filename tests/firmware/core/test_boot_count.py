@@ -106,7 +106,7 @@ STEPS = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(steps=STEPS, flashed=st.integers(0, 5))
 def test_numbers_rise_whatever_is_lost(core: Core, steps: list[tuple[str, int, str]], flashed: int) -> None:
     board = Board(core, boot_count=flashed)
