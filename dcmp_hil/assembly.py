@@ -21,14 +21,14 @@ from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.safety.chatter import Chatter
-from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.limits import Limits
 from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
-from dcmp_hil.safety.outlier_filter import Outliers
+from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.safety.polarity_check import probe_for
 from dcmp_hil.safety.speed_resolution import resolution
 from dcmp_hil.safety.supervisor import Supervisor
-from dcmp_hil.telemetry.block import Aligner
+from dcmp_hil.telemetry.block import ReferenceAligner
 from dcmp_hil.telemetry.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from dcmp_hil.plugins.roles import Role
     from dcmp_hil.stop import Check
     from dcmp_hil.telemetry.recorder import Sink
-    from dcmp_hil.telemetry.telemetry_process import Apart
+    from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
     from dcmp_hil.values import Event
 
 _SETTLING_TIME_S = 0.25  # ten time constants of the observer
@@ -57,7 +57,7 @@ def assemble(
     sinks: Sequence[Sink],
     *,
     in_line: bool,
-    apart: Apart | None = None,
+    apart: TelemetryProcess | None = None,
     mailbox: Mailbox | None = None,
     stop: StopRequest | None = None,
     clear: bool = False,
@@ -75,7 +75,7 @@ def assemble(
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,
-        Aligner(trajectory.at, rig.delay, lambda: trajectory.began),
+        ReferenceAligner(trajectory.at, rig.delay, lambda: trajectory.began),
         sinks,
         recent=max(1, round(rig.loop.rate_hz)),
         in_line=in_line,
@@ -109,7 +109,9 @@ def assemble(
         controller=faults.controller(controller),
         supervisor=supervisor,
         telemetry=recorder,
-        overruns=Overruns(rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None),
+        overruns=DeadlineMonitor(
+            rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None
+        ),
         clock=clock,
         delay=rig.delay,
         changes=changes or NoChanges(),
@@ -201,11 +203,11 @@ def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
     )
 
 
-def make_outliers(rig: Rig) -> Outliers:
+def make_outliers(rig: Rig) -> OutlierFilter:
     """Make what leaves wrong counts out; with `monitors = "finite"` it leaves none out."""
     limits = rig.supervisor
     fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf
-    return Outliers(fastest, rig.period, rig.encoder.count)
+    return OutlierFilter(fastest, rig.period, rig.encoder.count)
 
 
 def _make_custom(rig: Rig, section: Custom, role: Role, context: object) -> Any:

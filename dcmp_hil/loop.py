@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from dcmp_hil.control.trajectory import Trajectory
     from dcmp_hil.live.changes import Changes
     from dcmp_hil.platform.clock import Clock
-    from dcmp_hil.safety.deadline_monitor import Overruns
-    from dcmp_hil.safety.outlier_filter import Outliers
+    from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
+    from dcmp_hil.safety.outlier_filter import OutlierFilter
     from dcmp_hil.safety.supervisor import Supervisor
 
 
@@ -42,14 +42,14 @@ class Line:
     """The stages of a cycle, in the order in which a sample passes them."""
 
     backend: Backend
-    outliers: Outliers
+    outliers: OutlierFilter
     observer: Observer
     predictor: Predictor
     trajectory: Trajectory
     controller: Controller
     supervisor: Supervisor
     telemetry: Telemetry
-    overruns: Overruns
+    overruns: DeadlineMonitor
     clock: Clock
     delay: float  # s, from a sample to the instant at which its command acts
     changes: Changes = field(default_factory=NoChanges)

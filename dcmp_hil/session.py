@@ -19,11 +19,11 @@ from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
 from dcmp_hil.platform.realtime import RealTime
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.result import Result
-from dcmp_hil.telemetry.memory_sink import Keeper
+from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.sink_factories import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.telemetry.summary_sink import Figures
-from dcmp_hil.telemetry.telemetry_process import Apart
+from dcmp_hil.telemetry.summary_sink import SummarySink
+from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 from dcmp_hil.values import CauseData, Event, EventKind
 
 if TYPE_CHECKING:
@@ -104,14 +104,14 @@ class Session:
         self._realtime = None if fast else RealTime(rig.timing)
         self._host = host_facts()
         statistics = Statistics(rig.period, window_from)
-        self._apart: Apart | None = None
-        self._figures = Figures(statistics, Keeper() if keep_columns else None)
+        self._apart: TelemetryProcess | None = None
+        self._figures = SummarySink(statistics, MemorySink() if keep_columns else None)
         if fast:
             here = [self._figures, *deferred(sinks)]
         else:
             here, there = sorted_out(sinks)
             model = rig.model.values()
-            self._apart = Apart(
+            self._apart = TelemetryProcess(
                 statistics,
                 keep=keep_columns,
                 sinks=there,

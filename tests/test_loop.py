@@ -11,8 +11,8 @@ import pytest
 from dcmp_hil import loop, run
 from dcmp_hil.errors import TripError
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.safety.deadline_monitor import Overruns
-from dcmp_hil.safety.outlier_filter import Outliers
+from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
+from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.stop import Stop
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench
@@ -69,7 +69,7 @@ class _Stages:
 
         return loop.Line(
             backend=self.stage({"read": self.read, "write": lambda _: None}),
-            outliers=Outliers(math.inf, 1e-3, 0.0),
+            outliers=OutlierFilter(math.inf, 1e-3, 0.0),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
             predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
             trajectory=self.stage(
@@ -85,7 +85,7 @@ class _Stages:
                 }
             ),
             telemetry=self.stage({"record": lambda _: None}),
-            overruns=Overruns(1e-3),
+            overruns=DeadlineMonitor(1e-3),
             clock=clock,
             delay=0.001,
         )

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dcmp_hil.safety.outlier_filter import Outliers
+from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T
@@ -17,7 +17,7 @@ SPEED = 20.0  # rad/s: four times that is 0.08 rad a period
 
 class _Bench:
     def __init__(self, speed: float = SPEED) -> None:
-        self.outliers = Outliers(speed, T, COUNT)
+        self.outliers = OutlierFilter(speed, T, COUNT)
 
     @property
     def stop(self) -> Stop | None:

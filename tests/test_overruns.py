@@ -10,7 +10,7 @@ import pytest
 
 from dcmp_hil.errors import DeadlineError
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.stop import Urgency
 from dcmp_hil.values import Timing
 from sim_backend.backend import SimBackend
@@ -25,9 +25,9 @@ _LATE = Timing(1.6 * T, 0.6 * T, 20e-6)
 _SLOW = Timing(T, 0.0, 1.1 * T)
 
 
-def _warm(limit: int | None = None) -> Overruns:
+def _warm(limit: int | None = None) -> DeadlineMonitor:
     """Return one that has seen its first 0.1 s."""
-    overruns = Overruns(T, limit)
+    overruns = DeadlineMonitor(T, limit)
     for _ in range(100):
         overruns.check(_ON_TIME)
     return overruns
@@ -61,7 +61,7 @@ def test_overruns_end_the_run_at_their_limit_of_twenty(timing: Timing) -> None:
 
 
 def test_overruns_end_nothing_while_everything_is_cold() -> None:
-    overruns = Overruns(T, 1)
+    overruns = DeadlineMonitor(T, 1)
     for _ in range(100):
         overruns.check(_SLOW)
     overruns.check(_ON_TIME)
@@ -70,7 +70,7 @@ def test_overruns_end_nothing_while_everything_is_cold() -> None:
 
 
 def test_overruns_only_count_when_there_is_no_limit() -> None:
-    overruns = Overruns(T)
+    overruns = DeadlineMonitor(T)
     for _ in range(1000):
         overruns.check(_SLOW)
     assert overruns.count == 1000
@@ -78,7 +78,7 @@ def test_overruns_only_count_when_there_is_no_limit() -> None:
 
 @pytest.mark.parametrize("ppm", [-10_000, -100, 100, 9_900])
 def test_overruns_forgive_a_device_whose_clock_is_off(ppm: float) -> None:
-    overruns = Overruns(T, 1)
+    overruns = DeadlineMonitor(T, 1)
     for k in range(100_000):
         overruns.check(Timing(T, 1e-6 * ppm * k * T, 20e-6))
     assert overruns.count == 0

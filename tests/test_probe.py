@@ -7,7 +7,7 @@ import math
 import pytest
 
 from dcmp_hil.errors import TripError
-from dcmp_hil.safety.polarity_check import Probe
+from dcmp_hil.safety.polarity_check import PolarityCheck
 from dcmp_hil.values import Event, ProbeData, Sample
 
 T = 1e-3
@@ -24,7 +24,7 @@ def probe(
     told: list[Event] | None = None,
 ) -> tuple[float, list[float]]:
     """Let a probe try a motor that is `gain` times what it believes; return the way it went, the voltages."""
-    made = Probe(KU, 1.0, count, None if told is None else told.append)
+    made = PolarityCheck(KU, 1.0, count, None if told is None else told.append)
     x = v = 0.0
     farthest = 0.0
     sent: list[float] = []
@@ -81,14 +81,14 @@ def test_probe_refuses_an_arm_that_moves_by_itself(drift: float) -> None:
 
 
 def test_probe_refuses_nan() -> None:
-    made = Probe(KU, 1.0, 0.0)
+    made = PolarityCheck(KU, 1.0, 0.0)
     assert made.check(Sample(0.0, 0.0, 0.0)) is None
     assert made.check(Sample(T, math.nan, 0.0)) is not None
 
 
 @pytest.mark.parametrize(("counts", "telling"), [(4096, True), (1000, True), (16, False)])
 def test_probe_knows_when_the_encoder_is_too_coarse(counts: int, telling: bool) -> None:
-    assert Probe(KU, 1.0, math.tau / counts).telling is telling
+    assert PolarityCheck(KU, 1.0, math.tau / counts).telling is telling
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from dcmp_hil.device.links.factory import make_link
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named
 from dcmp_hil.telemetry import signals
-from dcmp_hil.telemetry.memory_sink import Keeper
+from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
 from dcmp_hil.telemetry.run_plot import draw_run
@@ -154,7 +154,7 @@ def test_every_plot_of_the_table_is_in_the_dashboard(
 def test_every_plot_of_the_table_is_in_the_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     image = pytest.importorskip("matplotlib.image")
     monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, MORE[0]))  # an odd number of plots
-    draw_run(feed(Keeper()), "with more", tmp_path / "run.png")
+    draw_run(feed(MemorySink()), "with more", tmp_path / "run.png")
     pixels = image.imread(tmp_path / "run.png")[..., :3].reshape(-1, 3)
     found = {tuple(map(int, pixel)) for pixel in (pixels * 255).round().astype(int)}
     assert MORE[0].colour in found

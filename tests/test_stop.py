@@ -14,9 +14,9 @@ import dcmp_hil
 from dcmp_hil.assembly import make_limits, make_outliers, make_supervisor
 from dcmp_hil.errors import DeadlineError, Explanation, TripError
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
-from dcmp_hil.safety.deadline_monitor import Overruns
+from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.monitors import Finite, Ranges
-from dcmp_hil.safety.polarity_check import Probe
+from dcmp_hil.safety.polarity_check import PolarityCheck
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.stop import Stop, Urgency
 from dcmp_hil.values import Estimate, Sample, Timing
@@ -50,10 +50,10 @@ def test_a_check_raises_nothing_for_any_input(check: Check) -> None:
 
 
 def test_probe_and_deadlines_raise_nothing_either() -> None:
-    probe, overruns = Probe(5.4, 1.0, 0.0), Overruns(T, 3)
+    probe, overruns = PolarityCheck(5.4, 1.0, 0.0), DeadlineMonitor(T, 3)
     for t, position, voltage in product(ODD, repeat=3):
         for stop in (
-            Probe(5.4, 1.0, 0.0).check(Sample(t, position, voltage)),
+            PolarityCheck(5.4, 1.0, 0.0).check(Sample(t, position, voltage)),
             probe.check(Sample(t, position, voltage)),
             overruns.check(Timing(t, position, voltage)),
         ):

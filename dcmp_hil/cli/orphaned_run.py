@@ -12,7 +12,7 @@ from dcmp_hil.cli.run_sinks import use_terminal
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.summary_sink import Figures
+    from dcmp_hil.telemetry.summary_sink import SummarySink
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Unattended:
     note: str
     faults: tuple[str, ...]
 
-    def __call__(self, figures: Figures, dropped: int, ended_by: str, sentence: str) -> None:
+    def __call__(self, figures: SummarySink, dropped: int, ended_by: str, sentence: str) -> None:
         """Write them, from what telemetry has of the run.
 
         Parameters

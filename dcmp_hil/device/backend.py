@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.device import open_errors
-from dcmp_hil.device.client import MOST_WAITING, Caller
-from dcmp_hil.device.device_config import Terms
-from dcmp_hil.device.disarm import DeviceEnd, Goodbye
+from dcmp_hil.device.client import MOST_WAITING, DeviceClient
+from dcmp_hil.device.device_config import DeviceConfig
+from dcmp_hil.device.disarm import DeviceEnd, Disarm
 from dcmp_hil.device.handshake import Handshake
 from dcmp_hil.device.link_statistics import LinkMeter
 from dcmp_hil.device.run_exit import another_runs, why_left
@@ -56,7 +56,7 @@ class DeviceBackend:
     """
 
     def __init__(self, rig: Rig, link: Link, clock: Clock) -> None:
-        self._terms = terms = Terms.of(rig)
+        self._terms = terms = DeviceConfig.of(rig)
         self._link, self._clock = link, clock
         self._node, self._period = terms.node, rig.period
         self._patience_ns = int(1e9 * max(_SILENT_PERIODS * rig.period, _SILENT_S))
@@ -93,7 +93,7 @@ class DeviceBackend:
         """
         self._link.open()
         try:
-            caller = Caller(self._link, self._clock, self._node)
+            caller = DeviceClient(self._link, self._clock, self._node)
             greeting = Handshake(self._link, caller, self._terms, self._clock, clear=self.clear).run()
         except BaseException:
             self._link.close()
@@ -293,14 +293,14 @@ class DeviceBackend:
 
     def _leave(self, error: BaseException | None) -> None:
         """Disarm the device; send STOP instead after a trip, or if the device does not answer."""
-        caller = Caller(self._link, self._clock, self._node, self._tick)
+        caller = DeviceClient(self._link, self._clock, self._node, self._tick)
         if isinstance(error, BackendError):
             if not self._forgotten:
                 caller.say(Stop(StopReason.NO_SAMPLE))
             return
         if isinstance(error, TripError) and not error.orderly:
             caller.say(Stop(StopReason.SUPERVISOR))
-        goodbye = Goodbye(caller, self._clock, self._session, self._ttl_ms)
+        goodbye = Disarm(caller, self._clock, self._session, self._ttl_ms)
         self.device_end = goodbye.run(answered=self._answered == self._tick)
         self._meter.take_health(caller.health)
         if self.device_end is None:

@@ -9,7 +9,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterValue, Result
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.client import Caller
+    from dcmp_hil.device.client import DeviceClient
 
 _CAUSES = ("unknown", "power", "reset pin", "software", "watchdog", "brown-out")
 _WATCHDOG, _BROWN_OUT = 4, 5
@@ -57,7 +57,7 @@ class History(NamedTuple):
         return _CAUSES[self.cause] if 0 <= self.cause < len(_CAUSES) else f"cause {self.cause}"
 
 
-def history_of(caller: Caller) -> History:
+def history_of(caller: DeviceClient) -> History:
     """Ask a device for its past; it need not be owned."""
     return History(
         *(
@@ -72,7 +72,7 @@ def history_of(caller: Caller) -> History:
     )
 
 
-def _told(caller: Caller, parameter: Parameter) -> int | None:
+def _told(caller: DeviceClient, parameter: Parameter) -> int | None:
     found = caller.ask(ParameterGet(parameter), ParameterValue, lambda answer: answer.id == parameter)
     return found.value if found is not None and found.result == Result.OK else None
 

@@ -42,7 +42,7 @@ class _Owed(NamedTuple):
     until_ns: int
 
 
-class Caller:
+class DeviceClient:
     """The host's side of a request and answer exchange with one device.
 
     Answers carry no number. A question of a kind is asked again only when the answers to those before have

@@ -10,7 +10,7 @@ from dcmp_hil.wire.messages import Parameter
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.device_config import Terms
+    from dcmp_hil.device.device_config import DeviceConfig
 
 _INT32_MAX = 2**31 - 1
 RANGES = {
@@ -49,7 +49,7 @@ def is_possible(parameter: Parameter, value: int) -> bool:
     return lowest <= value <= highest
 
 
-def differences(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+def differences(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return the differences of device and rig, each with its remedy.
 
     Parameters
@@ -62,7 +62,7 @@ def differences(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
     return [sentence for sentence in (*_same(terms, device), *_limits(terms, device)) if sentence]
 
 
-def remarks(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+def remarks(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return remarks on properties of the device that the rig does not state and does not need."""
     slew = device[Parameter.SLEW_MV_PER_MS]
     sentence = (
@@ -72,7 +72,7 @@ def remarks(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
     return [sentence] if slew and terms.slew_mV_per_ms is None else []
 
 
-def _same(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+def _same(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     counts = device[Parameter.COUNTS_PER_REV]
     rate_hz, asked_hz = 1e6 / device[Parameter.PERIOD_US], 1e6 / terms.period_us
     found = [_supply(terms.supply_mV, device[Parameter.SUPPLY_MV])]
@@ -106,7 +106,7 @@ def _supply(asked_mV: int, found_mV: int) -> str:
     )
 
 
-def _limits(terms: Terms, device: Mapping[Parameter, int]) -> list[str]:
+def _limits(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return the limits of the device that are below the rig's.
 
     Travel as the board was built with it counts from where the device was armed first: with a zero that is

@@ -18,7 +18,7 @@ _PARAMETER_MAX = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
+class DeviceConfig:
     """The settings of a rig that concern its device.
 
     Parameters
@@ -73,7 +73,7 @@ class Terms:
     warn_clock_share: float
 
     @classmethod
-    def of(cls, rig: Rig) -> Terms:
+    def of(cls, rig: Rig) -> DeviceConfig:
         """Read them from a rig whose backend is a device.
 
         Raises

@@ -9,7 +9,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, Health, State
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.client import Caller
+    from dcmp_hil.device.client import DeviceClient
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.messages import SampleReport
 
@@ -27,7 +27,7 @@ class DeviceEnd(NamedTuple):
     fault: str  # its name; empty without one
 
 
-class Goodbye:
+class Disarm:
     """The end of a session.
 
     Parameters
@@ -42,7 +42,7 @@ class Goodbye:
         ms, of the last commands.
     """
 
-    def __init__(self, caller: Caller, clock: Clock, session: int, ttl_ms: int) -> None:
+    def __init__(self, caller: DeviceClient, clock: Clock, session: int, ttl_ms: int) -> None:
         self._caller, self._clock = caller, clock
         self._session, self._ttl_ms = session, ttl_ms
 

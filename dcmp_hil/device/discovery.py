@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.device.boot_history import history_of
-from dcmp_hil.device.client import Caller
+from dcmp_hil.device.client import DeviceClient
 from dcmp_hil.device.links.factory import make_link
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.errors import ConfigError, DcmpError
@@ -178,10 +178,10 @@ def _ask(
     link = make_link(settings, clock)
     try:
         link.open()
-        nodes = _hear_nodes(Caller(link, clock, 0), clock, wait)
+        nodes = _hear_nodes(DeviceClient(link, clock, 0), clock, wait)
         found = {}
         for node, twice in nodes.items():
-            caller = Caller(link, clock, node)
+            caller = DeviceClient(link, clock, node)
             words = _describe(caller, node, twice=twice)
             found[node] = words, history_of(caller).sentence if history else ""
         return found, link.corrupt > 0
@@ -189,7 +189,7 @@ def _ask(
         link.close()
 
 
-def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
+def _hear_nodes(caller: DeviceClient, clock: Clock, wait: float) -> dict[int, bool]:
     """Return the nodes that were heard, and whether each is there twice.
 
     Two SAMPLEs, one tick after the other, are no accident; `wait` (s) is for the first.
@@ -219,7 +219,7 @@ def _hear_nodes(caller: Caller, clock: Clock, wait: float) -> dict[int, bool]:
     return {node: node in twice for node in sorted(nodes | twice)}
 
 
-def _describe(caller: Caller, node: int, *, twice: bool) -> str:
+def _describe(caller: DeviceClient, node: int, *, twice: bool) -> str:
     identity = caller.ask(Hello(_ASKS_ONLY, PROTOCOL_HASH), Identity)
     sample = caller.hear_sample(LISTEN)
     words = [f"node {node}"]

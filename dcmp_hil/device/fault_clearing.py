@@ -11,7 +11,7 @@ from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, State, StopReason
 
 if TYPE_CHECKING:
-    from dcmp_hil.device.client import Caller
+    from dcmp_hil.device.client import DeviceClient
     from dcmp_hil.platform.clock import Clock
 
 _FAULT_REPORT_TIMEOUT_S = 0.25  # s: FAULT comes every 100 ms
@@ -49,7 +49,14 @@ class Clearing:
     """
 
     def __init__(
-        self, name: str, caller: Caller, clock: Clock, session: int, ttl_ms: int, *, allowed: bool = False
+        self,
+        name: str,
+        caller: DeviceClient,
+        clock: Clock,
+        session: int,
+        ttl_ms: int,
+        *,
+        allowed: bool = False,
     ) -> None:
         self._name, self._caller, self._clock = name, caller, clock
         self._session, self._ttl_ms, self._allowed = session, ttl_ms, allowed

@@ -33,8 +33,8 @@ from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.client import Caller
-    from dcmp_hil.device.device_config import Terms
+    from dcmp_hil.device.client import DeviceClient
+    from dcmp_hil.device.device_config import DeviceConfig
     from dcmp_hil.device.links.base import Link
     from dcmp_hil.errors import OpenError
     from dcmp_hil.platform.clock import Clock
@@ -81,7 +81,7 @@ class Handshake:
     """
 
     def __init__(
-        self, link: Link, caller: Caller, terms: Terms, clock: Clock, *, clear: bool = False
+        self, link: Link, caller: DeviceClient, terms: DeviceConfig, clock: Clock, *, clear: bool = False
     ) -> None:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._clear = clear

@@ -13,8 +13,8 @@ from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, Parame
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.device.client import Caller
-    from dcmp_hil.device.device_config import Terms
+    from dcmp_hil.device.client import DeviceClient
+    from dcmp_hil.device.device_config import DeviceConfig
 
 _COUNT_READINGS = 3  # at a count before it is taken for the arm's
 _COUNTS = 2**24  # of a SAMPLE
@@ -33,7 +33,7 @@ class Parameters:
         That owns the device when something is set.
     """
 
-    def __init__(self, name: str, caller: Caller, session: int) -> None:
+    def __init__(self, name: str, caller: DeviceClient, session: int) -> None:
         self._name, self._caller, self._session = name, caller, session
 
     def get(self, parameter: Parameter) -> int:
@@ -55,7 +55,7 @@ class Parameters:
         """Return the device's parameters that are compared with the rig."""
         return {parameter: self.get(parameter) for parameter in COMPARED}
 
-    def put_limits(self, terms: Terms, built: Mapping[Parameter, int]) -> int:
+    def put_limits(self, terms: DeviceConfig, built: Mapping[Parameter, int]) -> int:
         """Lower the device's limits to the rig's, and read back that it keeps them.
 
         They are the session's: they end with it. Never more is set than the board was built with.

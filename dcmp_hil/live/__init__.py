@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.ipc.mailbox import Mailbox
-    from dcmp_hil.telemetry.summary_sink import Figures
+    from dcmp_hil.telemetry.summary_sink import SummarySink
 
 
 class Control(Protocol):
@@ -21,7 +21,7 @@ class Control(Protocol):
         ...
 
     @property
-    def unattended(self) -> Callable[[Figures, int, str, str], None] | None:
+    def unattended(self) -> Callable[[SummarySink, int, str, str], None] | None:
         """Called in the telemetry process where the run's process has ended by force; it can be pickled.
 
         It is given the figures, the periods that are in none of them, and how the run ended: in a word that

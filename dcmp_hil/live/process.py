@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.telemetry.summary_sink import Figures
+    from dcmp_hil.telemetry.summary_sink import SummarySink
 
 _START_TIMEOUT_S = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
 _POLL_PERIOD_S = 0.1  # s
@@ -59,7 +59,7 @@ class ControlProcess:
     """
 
     def __init__(
-        self, *, listen: bool = True, unattended: Callable[[Figures, int, str, str], None] | None = None
+        self, *, listen: bool = True, unattended: Callable[[SummarySink, int, str, str], None] | None = None
     ) -> None:
         self._listen, self.unattended = listen, unattended
         self._file, self._setup = reserve(self, "mailbox"), reserve(self, "control")

@@ -16,7 +16,7 @@ _WARM_UP_S = 0.1  # s: the first periods find nothing in the caches, and the amp
 _WINDOW_MASK = (1 << _WINDOW_PERIODS) - 1
 
 
-class Overruns:
+class DeadlineMonitor:
     """Looks at the timing of each cycle.
 
     A period is late if its sample came more than half a period after its instant, or if its command took

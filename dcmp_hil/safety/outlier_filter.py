@@ -16,7 +16,7 @@ _JUMP_MIN_COUNTS = 8.0  # counts: noise and the encoder's step at high rates
 _OUTLIERS_MAX, _WINDOW_SAMPLES = 3, 100  # outliers, samples
 
 
-class Outliers:
+class OutlierFilter:
     """Finds encoder counts that are wrong for a moment.
 
     Parameters

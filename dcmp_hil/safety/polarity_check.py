@@ -73,7 +73,7 @@ class MotorGain(NamedTuple):
         return Event(t, "WARN", EventKind.PROBE, f"{said}. {remedy}", data)
 
 
-class Probe:
+class PolarityCheck:
     """Moves the arm by a few hundredths of a radian and compares with what `[model]` says.
 
     The second push lasts as long as the first. Until the arm turns round, friction, gravity and a constant
@@ -251,7 +251,7 @@ class Probe:
 
 def probe_for(
     model: Model, voltage_limit: float, count: float, notify: Callable[[Event], None] | None = None
-) -> Probe | None:
+) -> PolarityCheck | None:
     """Make the probe of a rig; None where its encoder is too coarse to tell.
 
     Parameters
@@ -267,5 +267,5 @@ def probe_for(
     """
     gentle = min(_PROBE_V, _GENTLE / model.ku)
     voltage = min(voltage_limit, max(gentle, _OVER_FRICTION * model.f1 / model.ku))
-    probe = Probe(model.ku, voltage, count, notify, gravity=model.gravity)
+    probe = PolarityCheck(model.ku, voltage, count, notify, gravity=model.gravity)
     return probe if probe.telling else None

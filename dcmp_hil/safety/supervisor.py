@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dcmp_hil.safety.limits import Limits
-    from dcmp_hil.safety.polarity_check import MotorGain, Probe
+    from dcmp_hil.safety.polarity_check import MotorGain, PolarityCheck
     from dcmp_hil.stop import Check
     from dcmp_hil.values import Estimate, Sample
 
@@ -98,7 +98,7 @@ class Supervisor:
         settle: float,
         engage: float,
         notify: Callable[[Event], None],
-        probe: Probe | None = None,
+        probe: PolarityCheck | None = None,
     ) -> None:
         self._checks = tuple(one.check for one in checks)
         self.limits = limits

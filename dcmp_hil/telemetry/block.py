@@ -76,7 +76,7 @@ class Block:
         return error
 
 
-class Aligner:
+class ReferenceAligner:
     """Finds the reference at each sample's own instant, period by period.
 
     A cycle holds the reference at t + delay; the one at t is that of the cycle `delay` earlier. Where

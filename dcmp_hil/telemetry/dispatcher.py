@@ -37,7 +37,7 @@ class Sink(Protocol):
         ...
 
 
-class Audience:
+class SinkDispatcher:
     """Dispatches the rows of a ring and the waiting events to the sinks, when `dispatch` is called.
 
     Parameters
@@ -116,7 +116,7 @@ def _warnings(sink: Sink) -> Sequence[str]:
     return warnings
 
 
-class Service:
+class DispatchThread:
     """A thread that dispatches every `interval`, ten times a second by default, until `finish` is called.
 
     Parameters
@@ -127,7 +127,7 @@ class Service:
         s between two times.
     """
 
-    def __init__(self, audience: Audience, interval: float = INTERVAL) -> None:
+    def __init__(self, audience: SinkDispatcher, interval: float = INTERVAL) -> None:
         self.audience = audience
         self._interval = interval
         self.finishing = threading.Event()

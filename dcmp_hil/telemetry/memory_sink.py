@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 
-class Keeper:
+class MemorySink:
     """A sink for results, figures and tests; about 140 bytes a period."""
 
     def __init__(self) -> None:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.ipc.ring import Ring
-from dcmp_hil.telemetry.dispatcher import Audience, Service, Sink
+from dcmp_hil.telemetry.dispatcher import DispatchThread, Sink, SinkDispatcher
 from dcmp_hil.telemetry.link_events import LinkWatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.control.model import Model
-    from dcmp_hil.telemetry.block import Aligner
-    from dcmp_hil.telemetry.telemetry_process import Apart
+    from dcmp_hil.telemetry.block import ReferenceAligner
+    from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
     from dcmp_hil.values import Cycle, Event, Truth
 
 __all__ = ["Recorder", "Sink"]
@@ -53,12 +53,12 @@ class Recorder:
     def __init__(
         self,
         truth: Callable[[], Truth],
-        aligner: Aligner,
+        aligner: ReferenceAligner,
         sinks: Sequence[Sink],
         *,
         recent: int,
         in_line: bool,
-        apart: Apart | None = None,
+        apart: TelemetryProcess | None = None,
         model: Model = UNKNOWN_MODEL,
         backend: object = None,
     ) -> None:
@@ -68,14 +68,16 @@ class Recorder:
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now
-        self._audience = Audience(Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model)
+        self._audience = SinkDispatcher(
+            Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model
+        )
         self.link = LinkWatch(backend, 1, self.event)
         self._look_at_link = self.link.look
         self._every = self._left = min(
             recent, _SYNCHRONOUS_BLOCK_ROWS_MAX
         )  # periods until what is done now and then
         self._in_line = in_line
-        self._service = Service(self._audience) if sinks and not in_line else None
+        self._service = DispatchThread(self._audience) if sinks and not in_line else None
         self._closed = False
 
     def record(self, cycle: Cycle) -> None:

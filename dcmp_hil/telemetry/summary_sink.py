@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.memory_sink import Keeper
+    from dcmp_hil.telemetry.memory_sink import MemorySink
     from dcmp_hil.telemetry.statistics import Statistics
 
 _TROUBLES, _TEXT_CHARS_MAX = 100, 500  # characters
 
 
-class Figures:
+class SummarySink:
     """A sink of sinks.
 
     Parameters
@@ -37,7 +37,7 @@ class Figures:
         Warnings and errors with their time, the first hundred.
     """
 
-    def __init__(self, statistics: Statistics, keeper: Keeper | SharedKeeper | None) -> None:
+    def __init__(self, statistics: Statistics, keeper: MemorySink | SharedMemorySink | None) -> None:
         self.statistics = statistics
         self.keeper = keeper
         self.troubles: list[str] = []
@@ -68,14 +68,14 @@ class Figures:
 
 
 class Lengths(NamedTuple):
-    """Valid lengths of the files of a SharedKeeper, bytes."""
+    """Valid lengths of the files of a SharedMemorySink, bytes."""
 
     columns: int = 0
     events: int = 0
 
 
-class SharedKeeper:
-    """A Keeper whose memory another process shares, and can go on with where this one ended.
+class SharedMemorySink:
+    """A MemorySink whose memory another process shares, and can go on with where this one ended.
 
     Parameters
     ----------

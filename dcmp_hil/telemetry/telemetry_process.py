@@ -26,8 +26,8 @@ from dcmp_hil.ipc.shared_memory import Ledger, mapped, reserve
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
-from dcmp_hil.telemetry.dispatcher import Audience
-from dcmp_hil.telemetry.summary_sink import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.dispatcher import SinkDispatcher
+from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
 from dcmp_hil.telemetry.worker import DONE, FIGURES, UP, Setup, State
 from dcmp_hil.values import Event, EventKind
 
@@ -64,7 +64,7 @@ main({connection}, {setup}, {terminal})
 """
 
 
-class Apart:
+class TelemetryProcess:
     """The parent's side.
 
     Parameters
@@ -124,7 +124,7 @@ class Apart:
         self._channel: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self.ring = Ring(_CAPACITY, mapped(ring, size_of(_CAPACITY)))
-        self.figures = Figures(statistics, SharedKeeper(self._kept) if self._kept else None)
+        self.figures = SummarySink(statistics, SharedMemorySink(self._kept) if self._kept else None)
         self.dropped = 0
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
@@ -260,12 +260,12 @@ class Apart:
     def _take_over(self) -> None:
         """Continue from the last state that the process wrote: at the very end, if all is well."""
         state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths(), [])
-        keeper = SharedKeeper(self._kept, state.kept) if self._kept else None
-        self.figures = Figures(state.statistics, keeper)
+        keeper = SharedMemorySink(self._kept, state.kept) if self._kept else None
+        self.figures = SummarySink(state.statistics, keeper)
         self.figures.troubles += state.troubles
         ring = Ring(self.ring.capacity, self.ring.memory)
         ring.position, ring.dropped = state.position, state.dropped
-        audience = Audience(ring, [self.figures], model=self._model)
+        audience = SinkDispatcher(ring, [self.figures], model=self._model)
         missing = min(self._events - state.events, len(self._told))
         for event in list(self._told)[len(self._told) - missing :]:
             audience.event(event)

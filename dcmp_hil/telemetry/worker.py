@@ -24,10 +24,10 @@ from dcmp_hil.ipc.shared_memory import Ledger, mapped
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.heap import trim
-from dcmp_hil.telemetry.dispatcher import INTERVAL, Audience, Service
+from dcmp_hil.telemetry.dispatcher import INTERVAL, DispatchThread, SinkDispatcher
 from dcmp_hil.telemetry.process_exit import how_it_died
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
-from dcmp_hil.telemetry.summary_sink import Figures, Lengths, SharedKeeper
+from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Setup:
     capacity
         Of the ring.
     ring, ledger, kept
-        Descriptors: of the ring's memory, of the ledger, of the two logs of a SharedKeeper if there is one.
+        Descriptors: of the ring's memory, of the ledger, of the logs of a SharedMemorySink if there is one.
     statistics
         Not begun.
     sinks
@@ -108,21 +108,21 @@ def main(connection: int, setup: int, terminal: int) -> None:
     parent = os.getppid()
     data = os.pread(setup, os.fstat(setup).st_size, 0)
     with socket.socket(fileno=connection) as channel:
-        _Watcher(pickle.loads(data), channel, parent).serve()  # noqa: S301 - written by our own parent
+        _TelemetryWorker(pickle.loads(data), channel, parent).serve()  # noqa: S301 - written by our own parent
     if any(thread.name == THREAD for thread in threading.enumerate()):
         sys.stderr.flush()
         os._exit(0)  # Rerun's own ending waits for a frozen viewer for ever
 
 
-class _Watcher:
+class _TelemetryWorker:
     def __init__(self, setup: Setup, channel: socket.socket, parent: int) -> None:
         self._setup, self._channel, self._parent = setup, channel, parent
-        self._keeper = SharedKeeper(setup.kept) if setup.kept else None
-        self._figures = Figures(setup.statistics, self._keeper)
+        self._keeper = SharedMemorySink(setup.kept) if setup.kept else None
+        self._figures = SummarySink(setup.statistics, self._keeper)
         self._ring = Ring(setup.capacity, mapped(setup.ring, size_of(setup.capacity)))
-        self._audience = Audience(self._ring, [self._figures], self._tell, setup.model)
+        self._audience = SinkDispatcher(self._ring, [self._figures], self._tell, setup.model)
         self._ledger = Ledger(setup.ledger)
-        self._services: list[Service] = []
+        self._services: list[DispatchThread] = []
         self._taken = 0  # events from the parent
         self._looks = 0
 
@@ -168,9 +168,9 @@ class _Watcher:
                 continue
             warnings += getattr(sink, "warnings", ())
             ring = Ring(self._ring.capacity, self._ring.memory)
-            audience = Audience(ring, [sink], self._tell, self._setup.model)
+            audience = SinkDispatcher(ring, [sink], self._tell, self._setup.model)
             interval = getattr(sink, "interval", INTERVAL) / self._setup.speed
-            self._services.append(Service(audience, interval))
+            self._services.append(DispatchThread(audience, interval))
         return warnings
 
     def _tell(self, event: Event) -> None:

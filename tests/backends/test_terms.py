@@ -6,13 +6,13 @@ import math
 
 import pytest
 
-from dcmp_hil.device.device_config import Terms
+from dcmp_hil.device.device_config import DeviceConfig
 from dcmp_hil.errors import ConfigError
 from tests.helpers import bench
 
 
 def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
-    terms = Terms.of(
+    terms = DeviceConfig.of(
         bench(
             "backend.kind=serial",
             "backend.port=/dev/null",
@@ -28,7 +28,7 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
             "amplifier.supply_V=24",
         )
     )
-    assert terms == Terms(
+    assert terms == DeviceConfig(
         *(3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, 24_000, -7, 20.0, 6.2832),
         *(6491, 2000, 3.0, 0.005, 0.005),
     )
@@ -36,7 +36,7 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
 
 @pytest.mark.parametrize(("limit", "counts"), [(2.0, 1428), (6366.2, 4_150_242), (0.01, 131)])
 def test_a_speed_limit_in_counts_is_the_rigs_and_one_count_in_8_ms(limit: float, counts: int) -> None:
-    terms = Terms.of(
+    terms = DeviceConfig.of(
         bench(
             "backend.kind=sim-board",
             'supervisor.monitors="finite"',
@@ -50,4 +50,4 @@ def test_a_speed_limit_in_counts_is_the_rigs_and_one_count_in_8_ms(limit: float,
 
 def test_terms_of_a_rig_without_a_wire_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"backend\.kind"):
-        Terms.of(bench())
+        DeviceConfig.of(bench())

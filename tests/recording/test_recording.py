@@ -145,7 +145,7 @@ from pathlib import Path
 from dcmp_hil.platform.clock import pause
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.writer import Recording
-from dcmp_hil.telemetry.dispatcher import Audience, Service
+from dcmp_hil.telemetry.dispatcher import DispatchThread, SinkDispatcher
 from dcmp_hil.ipc.ring import Ring
 from tests.helpers import bench
 import mmap
@@ -154,7 +154,7 @@ rig = bench(f"loop.rate_hz={rate}")
 with (folder / "ring").open("r+b") as file:
     ring = Ring(capacity, mmap.mmap(file.fileno(), 0))
 sink = Recording(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
-service = Service(Audience(ring, [sink]), sink.interval)
+service = DispatchThread(SinkDispatcher(ring, [sink]), sink.interval)
 (folder / "up").write_text("")
 while True:
     pause(1.0)

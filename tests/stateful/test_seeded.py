@@ -10,7 +10,7 @@ import pytest
 from hypothesis.stateful import run_state_machine_as_test
 
 from dcmp_hil.device.backend import DeviceBackend
-from dcmp_hil.device.disarm import Goodbye
+from dcmp_hil.device.disarm import Disarm
 from dcmp_hil.safety.limits import Limits
 from dcmp_hil.safety.monitors import Finite
 from dcmp_hil.safety.supervisor import TABLE, Cue, Phase, Supervisor
@@ -60,7 +60,7 @@ IN_HOST = {
     "no clamp": _method(Limits, "voltage", lambda _, __, demand, ___: demand),
     "NaN is let through": _method(Supervisor, "admit", _admit_nan),
     "a fault of the device is not seen": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
-    "no goodbye": _method(Goodbye, "run", lambda *_, **__: True),
+    "no goodbye": _method(Disarm, "run", lambda *_, **__: True),
 }
 
 IN_FIRMWARE = {

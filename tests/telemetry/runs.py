@@ -10,8 +10,8 @@ import numpy as np
 
 from dcmp_hil.control.model import Model
 from dcmp_hil.ipc.ring import Ring
-from dcmp_hil.telemetry.block import Aligner, Block
-from dcmp_hil.telemetry.memory_sink import Keeper
+from dcmp_hil.telemetry.block import Block, ReferenceAligner
+from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.rerun.rig_view import RigView
 from dcmp_hil.values import (
     UNKNOWN_TRUTH,
@@ -82,7 +82,7 @@ def truth(k: int) -> Truth:
 
 def blocks(periods: int, *, known: bool = True, rows: int = 100) -> list[Block]:
     """Run `periods` through ring and aligner."""
-    ring, aligner = Ring(4096), Aligner(at, T)
+    ring, aligner = Ring(4096), ReferenceAligner(at, T)
     made = []
     for k in range(periods):
         now, began = aligner.now(cycle(k).sample.t, cycle(k).reference)
@@ -94,7 +94,7 @@ def blocks(periods: int, *, known: bool = True, rows: int = 100) -> list[Block]:
 
 def feed(sink: Sink, periods: int = 1000, *, known: bool = True) -> dict[str, NDArray[np.float64]]:
     """Show a whole run to `sink`; return its columns."""
-    keeper = Keeper()
+    keeper = MemorySink()
     for event in EVENTS:
         sink.event(event)
     for block in blocks(periods, known=known):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.telemetry.block import Block
-    from dcmp_hil.telemetry.telemetry_process import Apart
+    from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 
 T = 1e-3  # s
 BOUND_S = 60.0  # s: generous, these machines are shared
@@ -100,7 +100,7 @@ def noted(file: Path, what: str) -> list[str]:
     return [line.removeprefix(what).strip() for line in lines if line.startswith(what)]
 
 
-def fill(apart: Apart, periods: int, first: int = 0) -> None:
+def fill(apart: TelemetryProcess, periods: int, first: int = 0) -> None:
     """Record cycles as the loop does."""
     for k in range(first, first + periods):
         apart.ring.push(cycle(k * T), UNKNOWN_TRUTH, HELD)

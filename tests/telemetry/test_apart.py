@@ -19,7 +19,7 @@ from dcmp_hil import ConfigError, run
 from dcmp_hil.session import Session
 from dcmp_hil.telemetry import telemetry_process as module
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.telemetry.telemetry_process import Apart
+from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 from dcmp_hil.values import Event, EventKind
 from tests.helpers import bench
 from tests.telemetry.sinks import Notes, Refuses, Sleeps, Strikes, T, fill, noted, strike_all
@@ -122,7 +122,7 @@ def test_a_run_ends_with_all_its_figures_when_the_process_does_not(number: signa
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: signal.Signals) -> None:
-    apart = Apart(Statistics(T), keep=True)
+    apart = TelemetryProcess(Statistics(T), keep=True)
     apart.open()
     fill(apart, 100)
     assert apart.pid is not None
@@ -137,7 +137,7 @@ def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: s
 def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_CAPACITY", 256)
     told: list[str] = []
-    apart = Apart(Statistics(T), keep=True, warn=told.append)
+    apart = TelemetryProcess(Statistics(T), keep=True, warn=told.append)
     apart.open()
     assert apart.pid is not None
     os.kill(apart.pid, signal.SIGSTOP)
@@ -151,7 +151,7 @@ def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.
 
 
 def test_events_never_block_and_come_back_although_they_are_not_read() -> None:
-    apart = Apart(Statistics(T), keep=True)
+    apart = TelemetryProcess(Statistics(T), keep=True)
     apart.open()
     assert apart.pid is not None
     os.kill(apart.pid, signal.SIGSTOP)
@@ -211,7 +211,9 @@ def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.Mon
     monkeypatch.setattr(module, "_START_TIMEOUT_S", 1e6)
     monkeypatch.setattr(module, "_SLOW_START_S", 0.3)
     told: list[str] = []
-    apart = Apart(Statistics(T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append)
+    apart = TelemetryProcess(
+        Statistics(T), keep=False, sinks=[pickle.dumps(partial(Sleeps, 1e6))], warn=told.append
+    )
     apart.open(lambda: bool(told))
     assert apart.pid is None
     apart.close()
@@ -220,7 +222,7 @@ def test_a_stop_ends_the_wait_for_a_process_that_is_slow(monkeypatch: pytest.Mon
 
 def test_a_process_that_works_at_its_figures_is_waited_for() -> None:
     told: list[str] = []
-    apart = Apart(Statistics(T), keep=True, sinks=[pickle.dumps(partial(Busy))], warn=told.append)
+    apart = TelemetryProcess(Statistics(T), keep=True, sinks=[pickle.dumps(partial(Busy))], warn=told.append)
     apart.open()
     fill(apart, 100)
     pid = apart.pid

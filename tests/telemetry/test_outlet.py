@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil.telemetry.rerun import stream_worker as module
-from dcmp_hil.telemetry.rerun.stream_worker import Outlet
+from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,8 +42,8 @@ def gate() -> Iterator[threading.Event]:
     event.set()
 
 
-def outlet(stream: Stream, *, patience: float = 10.0, ending: float = 10.0) -> Outlet:
-    return Outlet(stream, patience, ending)  # type: ignore[arg-type]
+def outlet(stream: Stream, *, patience: float = 10.0, ending: float = 10.0) -> StreamWorker:
+    return StreamWorker(stream, patience, ending)  # type: ignore[arg-type]
 
 
 def test_jobs_are_done_in_order_and_the_stream_is_ended() -> None:
@@ -78,7 +78,7 @@ def test_a_stream_that_cannot_be_flushed_is_left_as_it_is() -> None:
 def test_a_file_that_does_not_grow_is_told_of_with_what_was_measured(
     gate: threading.Event, tmp_path: Path
 ) -> None:
-    way = Outlet(Stream(), 1.0, 0.3, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
+    way = StreamWorker(Stream(), 1.0, 0.3, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
     way.do(lambda _: gate.wait())  # type: ignore[arg-type]
     with pytest.raises(TimeoutError, match=r"it did not grow for \d+\.\d s"):
         way.close(60.0)
@@ -89,7 +89,7 @@ def test_a_file_that_cannot_grow_is_not_waited_for(
 ) -> None:
     monkeypatch.setattr(module, "_FULL_DISK_STALL_TIMEOUT_S", 0.1)
     monkeypatch.setattr(module, "room_for", lambda _: 0)
-    way = Outlet(Stream(), 1.0, 60.0, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
+    way = StreamWorker(Stream(), 1.0, 60.0, file=tmp_path / "run.rrd")  # type: ignore[arg-type]
     way.do(lambda _: gate.wait())  # type: ignore[arg-type]
     with pytest.raises(TimeoutError, match=r"it did not grow for"):
         way.close(60.0)
@@ -107,7 +107,7 @@ def test_a_file_that_grows_slowly_is_waited_for(
                 growing.write(b"x")
             gate.wait(0.05)
 
-    way = Outlet(Stream(), 1.0, 60.0, file=file)  # type: ignore[arg-type]
+    way = StreamWorker(Stream(), 1.0, 60.0, file=file)  # type: ignore[arg-type]
     way.do(slowly)
     way.close(60.0)
     assert file.stat().st_size == 10

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.memory_sink import Keeper
+from dcmp_hil.telemetry.memory_sink import MemorySink
 from tests.telemetry.runs import feed
 
 pytest.importorskip("matplotlib")
@@ -32,7 +32,7 @@ def colours(path: Path) -> set[tuple[int, ...]]:
 
 @pytest.mark.parametrize("known", [True, False])
 def test_a_run_is_drawn_in_the_dashboard_s_colours(known: bool, tmp_path: Path) -> None:
-    draw_run(feed(Keeper(), known=known), "synthetic", tmp_path / "run.png")
+    draw_run(feed(MemorySink(), known=known), "synthetic", tmp_path / "run.png")
     assert {ESTIMATE, REFERENCE} <= colours(tmp_path / "run.png")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.telemetry import recorder as module
-from dcmp_hil.telemetry.block import Aligner
+from dcmp_hil.telemetry.block import ReferenceAligner
 from dcmp_hil.telemetry.recorder import Recorder
 from dcmp_hil.values import UNKNOWN_TRUTH, Event, EventKind, Reference
 from tests.helpers import cycle
@@ -75,7 +75,7 @@ class _Hangs(_Sink):
 
 
 def _recorder(*sinks: _Sink, in_line: bool = True, recent: int = 100) -> Recorder:
-    aligner = Aligner(lambda _: Reference(0.0, 0.0, 0.0), 0.0)
+    aligner = ReferenceAligner(lambda _: Reference(0.0, 0.0, 0.0), 0.0)
     return Recorder(lambda: UNKNOWN_TRUTH, aligner, sinks, recent=recent, in_line=in_line)
 
 

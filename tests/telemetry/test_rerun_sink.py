@@ -17,13 +17,13 @@ from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.ring import FIELDS, Ring
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.telemetry.dispatcher import Audience
+from dcmp_hil.telemetry.dispatcher import SinkDispatcher
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun import sink as rerun_sink
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
-from dcmp_hil.telemetry.rerun.stream_worker import Outlet
+from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
 from dcmp_hil.telemetry.signals import by_plot
 from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, cycle, entities, feed, read_back, truth, values
 
@@ -210,7 +210,7 @@ def test_connect_to_a_server_that_accepts_and_stays_silent_warns(monkeypatch: py
     sink.close()
 
 
-class _Stuck(Outlet):
+class _Stuck(StreamWorker):
     """An outlet to a viewer that takes nothing."""
 
     def do(self, job: Job) -> bool:  # noqa: ARG002
@@ -222,10 +222,10 @@ def test_a_viewer_that_takes_nothing_is_left_behind_and_the_file_stays_whole(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
-    monkeypatch.setattr(rerun_sink, "Outlet", _Stuck)
+    monkeypatch.setattr(rerun_sink, "StreamWorker", _Stuck)
     sink._open_viewer(rr.GrpcSink("rerun+http://127.0.0.1:1/proxy"), 1.0)  # noqa: SLF001
     ring = Ring(4096)
-    audience = Audience(ring, [sink])  # which hands a warning to every sink, this one too
+    audience = SinkDispatcher(ring, [sink])  # which hands a warning to every sink, this one too
     for k in range(500):
         ring.push(cycle(k), truth(k))
         if k % 100 == 99:

@@ -29,7 +29,7 @@ from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.viewer import free_port
 from dcmp_hil.telemetry.sink_factories import sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
-from dcmp_hil.telemetry.telemetry_process import Apart
+from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 from tools.soak.source import Leak, Source, a_minute, events
@@ -68,7 +68,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
     """
     rig = load_rig("bench-1khz")
     troubles: list[str] = []
-    apart = Apart(
+    apart = TelemetryProcess(
         Statistics(rig.period), keep=False, sinks=sorted_out(_makers(rig, folder, history, leak))[1],
         warn=troubles.append, model=rig.model.values(), speed=speed,
     )  # fmt: skip
@@ -126,7 +126,7 @@ def _makers(rig: Rig, folder: Path, history: str, leak: float) -> list[SinkMaker
     return [*makers, partial(Leak, leak)] if leak else makers
 
 
-def _wait_until_quiet(apart: Apart, folder: Path) -> None:
+def _wait_until_quiet(apart: TelemetryProcess, folder: Path) -> None:
     """Wait until the sinks have taken all there is and the files do not grow any more."""
     now = time.monotonic()
     quiet_from, end, sizes = now, now + _QUIET_TIMEOUT_S, [0]

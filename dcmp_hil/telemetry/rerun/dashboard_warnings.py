@@ -10,7 +10,7 @@ from dcmp_hil.platform.disk_space import room_for
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.telemetry.rerun.stream_worker import Outlet
+    from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
 
 _STUCK = (
     "The viewer has taken nothing for seconds and is left behind; the run goes on. "
@@ -35,14 +35,14 @@ NO_WINDOW = (
 )
 
 
-def stuck(outlet: Outlet) -> str:
+def stuck(outlet: StreamWorker) -> str:
     """Return the warning for an outlet that no longer takes data."""
     if outlet.file is None:
         return _STUCK
     return f"{incomplete(outlet, f'it did not grow for {outlet.stalled:.0f} s')} The run goes on."
 
 
-def incomplete(outlet: Outlet, reason: str) -> str:
+def incomplete(outlet: StreamWorker, reason: str) -> str:
     """Return the warning for an incomplete recording or view, with the measured figures."""
     if outlet.file is None:
         return f"What the viewer shows is incomplete: {reason}."

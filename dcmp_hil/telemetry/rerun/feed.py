@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.rerun.frames import Call
     from dcmp_hil.telemetry.rerun.rig_view import RigView
-    from dcmp_hil.telemetry.rerun.stream_worker import Outlet
+    from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
     from dcmp_hil.telemetry.signals import Signal
     from dcmp_hil.values import Event
 
@@ -43,7 +43,9 @@ class Feed:
         s after which what is sent once is sent again: a server forgets what is old.
     """
 
-    def __init__(self, outlet: Outlet, rig: RigView, span: float = 0.0, again: float = math.inf) -> None:
+    def __init__(
+        self, outlet: StreamWorker, rig: RigView, span: float = 0.0, again: float = math.inf
+    ) -> None:
         self.outlet = outlet
         self._frames = Frames(rig)
         self._span, self._period = span, rig.period

@@ -13,7 +13,7 @@ from dcmp_hil.telemetry.rerun.histogram import Histogram
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
 from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
-from dcmp_hil.telemetry.rerun.transitions import Lane
+from dcmp_hil.telemetry.rerun.transitions import TransitionDetector
 from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.values import LinkData, PhaseData
 
@@ -54,7 +54,7 @@ class Frames:
             field: Histogram(low * rig.period, high * rig.period)
             for field, (_, low, high, _) in HISTOGRAMS.items()
         }
-        self._lanes = {name: Lane() for name in ("voltage", "samples")}
+        self._lanes = {name: TransitionDetector() for name in ("voltage", "samples")}
         self._shown: dict[str, str] = {}  # lane to the newest state
         self._last_slot = -1
         self._portrait = Portrait()

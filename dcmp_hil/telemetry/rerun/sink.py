@@ -26,7 +26,7 @@ from dcmp_hil.telemetry.rerun.dashboard_warnings import (
 )
 from dcmp_hil.telemetry.rerun.feed import Feed
 from dcmp_hil.telemetry.rerun.recording_start import begin, warm_up
-from dcmp_hil.telemetry.rerun.stream_worker import Outlet
+from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
 
 if TYPE_CHECKING:
     import subprocess
@@ -202,7 +202,7 @@ class RerunSink:
             raise ConfigError(
                 NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _START_DATA_BYTES)
             )
-        outlet = Outlet(self._stream(), _FILE_PATIENCE, _CLOSE_TIMEOUT_S, file=record)
+        outlet = StreamWorker(self._stream(), _FILE_PATIENCE, _CLOSE_TIMEOUT_S, file=record)
         outlet.do(partial(warm_up, self._rig))
         # A footer would take memory for every chunk for as long as the run goes on: 25 MB a minute.
         outlet.do(partial(begin, rr.FileSink(record, write_footer=False), self._rig))
@@ -216,8 +216,8 @@ class RerunSink:
             raise ConfigError(f"The recording cannot begin: {record} does not grow. Free some space.")
         self._feeds.append(Feed(outlet, self._rig, _FILE_SPAN))
 
-    def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> Outlet:
-        outlet = Outlet(self._stream(), _VIEWER_PATIENCE, ending)
+    def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> StreamWorker:
+        outlet = StreamWorker(self._stream(), _VIEWER_PATIENCE, ending)
         outlet.do(partial(warm_up, self._rig))
         outlet.do(partial(begin, target, self._rig))
         self._feeds.append(Feed(outlet, self._rig, again=_RESEND_PERIOD_S))
@@ -243,7 +243,7 @@ class RerunSink:
         if outlet is not None and self.port is not None:
             self._open_window(outlet, self.port)
 
-    def _serve(self, first_port: int) -> Outlet | None:
+    def _serve(self, first_port: int) -> StreamWorker | None:
         """Serve viewers, which may connect at any time; a late one gets the earlier data."""
         for port in window.free_ports(first_port):
             target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
@@ -259,7 +259,7 @@ class RerunSink:
         )
         return None
 
-    def _open_window(self, outlet: Outlet, port: int) -> None:
+    def _open_window(self, outlet: StreamWorker, port: int) -> None:
         """Open it on what is known before the first period."""
         try:
             process = window.start_viewer(port)

@@ -34,7 +34,7 @@ def _no_farewell() -> None:
     """Leave at once."""
 
 
-class Outlet:
+class StreamWorker:
     """Does jobs with a stream, in order, on a thread that may get stuck without harm to other threads.
 
     Parameters

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class Lane:
+class TransitionDetector:
     """Remembers the last answer from block to block."""
 
     def __init__(self) -> None:
