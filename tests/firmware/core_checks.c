@@ -205,6 +205,7 @@ uint32_t check_silence(struct dcmp_device *device, uint32_t period_us, uint32_t 
     return UINT32_MAX;
 }
 
+#define FIRST_SIZES 4096
 #define TURNED 200 /* periods before the wrong count: more than are looked back at */
 
 /* True count some periods after the wrong one; the counter wraps on the way there. */
@@ -218,11 +219,20 @@ static uint32_t shown(int64_t count)
     return (uint32_t)(count - 5); /* wraps while it turns */
 }
 
+/* The longest window and the three counts of a middle reach no further back than that. Beyond it a wrong count shows
+ * only by an error that reads another place of the ring: the first sizes, and one in 64, are followed that far. */
+static int32_t periods_after(const struct dcmp_encoder *encoder, int64_t wrong)
+{
+    const int64_t size = wrong < 0 ? -wrong : wrong;
+    const bool all = size < FIRST_SIZES || size % 64 == 0;
+    return all ? (int32_t)DCMP_POSITIONS : encoder->windows[DCMP_WINDOWS - 1u].periods + 4;
+}
+
 static bool noticed(struct dcmp_encoder encoder, int32_t speed_limit, int32_t period_us, int32_t speed, int64_t wrong)
 {
     bool bad = false;
     const struct dcmp_speed_limits limits = {speed_limit, speed_limit};
-    const int32_t periods = (int32_t)DCMP_POSITIONS;
+    const int32_t periods = periods_after(&encoder, wrong);
     for (int32_t after = 0; after < periods && !bad; after++) {
         const int64_t count = turned(speed, period_us, after);
         const int64_t travel = count < 0 ? -count : count;
