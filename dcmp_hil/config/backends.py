@@ -51,13 +51,13 @@ class Device(Traits, Section):
     node: Annotated[int, Field(ge=0, le=15)] = 0
     """Number of the device on a shared bus."""
     watchdog_ms: Annotated[int, Field(ge=5, le=50)] = 20
-    """The device goes to 0 V when it hears nothing valid for so long, ms."""
+    """The device goes to 0 V when it receives nothing valid for this time, ms."""
     boot_wait_s: Annotated[float, Field(ge=0.5, le=60)] = 3.0
-    """How long a device may take from the opening of its port to its first sample, s: a board may boot."""
+    """Time from the opening of the port to the device's first sample, at most, s: a board may boot."""
     warn_percent: Annotated[float, Field(ge=0.01, le=100)] = 0.5
-    """A run warns when more of its samples or commands are lost or damaged, %."""
+    """A run warns when more than this share of its samples or commands is lost or damaged, %."""
     warn_clock_percent: Annotated[float, Field(ge=0.01, le=100)] = 0.5
-    """A run warns when the device's clock is further off this computer's, %."""
+    """A run warns when the device's clock deviates more than this from this computer's, %."""
 
 
 class SimBoard(Device):
@@ -100,7 +100,7 @@ class Can(Device):
     baud: Annotated[int, Field(ge=9600, le=12_000_000)] = 1_000_000
     """Bits per second of the serial line under interface = "slcan"."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """Handed to python-can's interface as they are, such as `fd = false`."""
+    """Options that are passed to python-can's interface unchanged, such as `fd = false`."""
 
     @property
     def capacity(self) -> Capacity | None:

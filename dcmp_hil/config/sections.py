@@ -17,7 +17,7 @@ class LoopSection(Section):
     """`[loop]`: how often, and how late a command acts."""
 
     rate_hz: float = Field(default=1000.0, ge=10.0, le=20_000.0)
-    """Samples a second, Hz."""
+    """Samples per second, Hz."""
     delay_samples: Annotated[int, Field(ge=0, le=1)] = 1  # a Literal would take true and 1.0
     """Periods from a sample to the instant at which its command acts: 1 on every real device."""
 
@@ -26,12 +26,12 @@ class EncoderSection(Section):
     """`[encoder]`: what one count means."""
 
     counts_per_rev: Annotated[float, Field(ge=16, le=2**24)] | Literal["ideal"] = 4096.0
-    """Counts a revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
+    """Counts per revolution (after quadrature), or "ideal" for no quantisation (simulation only)."""
 
     sign: Literal[1, -1] = 1
     """-1 if the encoder counts down when the arm rises; a simulated one then does."""
     zero: Annotated[int, Field(ge=-(2**23), le=2**23 - 1)] | Literal["at_start"] = "at_start"
-    """Count at which the arm hangs, or "at_start": where it is when a run begins. The simulated rig knows."""
+    """Count at which the arm hangs, or "at_start": the count at the start. The simulated rig knows it."""
 
     @property
     def counts(self) -> float | None:
@@ -48,14 +48,14 @@ class AmplifierSection(Section):
     """`[amplifier]`: what the amplifier may put out."""
 
     voltage_limit_V: Annotated[float, Field(gt=0, le=100)] | Literal["none"] = 10.0
-    """Largest voltage either way, V; "none" in simulation only."""
+    """Largest voltage of either sign, V; "none" in simulation only."""
     slew_V_s: Annotated[float, Field(ge=1, le=1e9)] | Literal["none"] = "none"
     """Largest change, V/s; "none" for no limit."""
 
     sign: Literal[1, -1] = 1
     """-1 if a positive voltage lowers the arm; a simulated motor is then wired so."""
     supply_V: Annotated[float, Field(ge=1, le=100)] | Literal["none"] = "none"
-    """The motor's supply, V, where the board divides it (PWM); "none": the amplifier is told a voltage."""
+    """The motor's supply, V, if the board divides it (PWM); "none": the amplifier takes a voltage command."""
 
     @property
     def supply_mV(self) -> int:
@@ -110,21 +110,21 @@ class SimSection(Section):
     step_us: Annotated[float, Field(ge=1, le=10_000)] | Literal["auto"] = "auto"
     """Plant step, us; must divide the period. "auto": the largest divisor not above 200 us."""
     integrator: Literal["moreau", "euler"] = "moreau"
-    """`moreau`: friction that can stick; `euler`: the paper's naive one."""
+    """`moreau`: friction that can stick; `euler`: the paper's explicit Euler steps."""
     position_rad: Annotated[float, Field(ge=-100, le=100)] = 0.0
-    """Where the arm is at the start, at rest, rad; 0 = hanging."""
+    """Position of the arm at the start, at rest, rad; 0 = hanging."""
     encoder_phase_counts: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """Where between two edges the encoder's zero lies, counts."""
+    """Offset of the encoder's zero between two edges, counts."""
     encoder_noise_counts: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Noise before the quantiser, standard deviation, counts (rad with an ideal encoder)."""
     dead_zone_V: Annotated[float, Field(ge=0, le=100)] = 0.0
-    """The amplifier puts out nothing below this, V."""
+    """The amplifier's output is 0 V below this, V."""
     voltage_step_mV: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Step of the amplifier's output, mV; 0 for none."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all noise: the same seed gives the same run to the bit."""
     plant: ModelSection = ModelSection()
-    """`[sim.plant]`: keys of [model] that the simulated plant has otherwise; the rest is as in [model]."""
+    """`[sim.plant]`: keys of [model] that differ in the simulated plant; the rest is as in [model]."""
 
 
 class SupervisorSection(Section):
@@ -133,15 +133,15 @@ class SupervisorSection(Section):
     start: Literal["engage", "immediate"] = "engage"
     """`engage`: settle at 0 V, then ramp authority; `immediate`: simulation and tests only."""
     probe: Literal["first", "off"] = "first"
-    """`first`: before engaging, +-1 V for 0.1 s each show which way the arm goes; `off`: trust the signs."""
+    """`first`: before engaging, +-1 V for 0.1 s each show the arm's direction; `off`: trust the signs."""
     monitors: Literal["all", "finite"] = "all"
     """`finite`: watch for NaN and device faults only, not for speed or chatter (simulation only)."""
     velocity_limit_rad_s: Annotated[float, Field(ge=0.01, le=10_000)] = 20.0
-    """Trip above this velocity, rad/s; kept by host and device. The reference is held 5 % short of it."""
+    """Trip above this velocity, rad/s; by host and device. The reference stays 5 % below it."""
     position_limit_rad: Annotated[float, Field(ge=0.01, le=10_000)] = 6.2832
-    """Trip beyond this position either way, rad; kept by host and device. The reference is held 5 % short."""
+    """Trip beyond this position of either sign, rad; by host and device. The reference stays 5 % below it."""
     error_limit_rad: Annotated[float, Field(ge=0.001, le=10_000)] | Literal["none"] = 1.5
-    """End the run when the arm was further off the reference than this for 0.5 s, rad; "none" for never."""
+    """End the run if the arm deviates by more than this from the reference for 0.5 s, rad; "none": never."""
     disturbance_limit_rad_s2: Annotated[float, Field(ge=0.01, le=1e6)] = 50.0
     """Trip when the watching observer's |w_hat|, filtered over 10 ms, stays above this for 5 ms, rad/s2."""
 
@@ -160,7 +160,7 @@ class TimingSection(Section):
     """`[timing]`: what a run in real time asks of the operating system, and what it does when it is late."""
 
     realtime: Literal["try", "enforce", "off"] = "try"
-    """`try`: take what the system grants, and say what not; `enforce`: refuse to start without it, exit 5."""
+    """`try`: use what the system grants, report the rest; `enforce`: refuse to start without it, exit 5."""
     priority: Annotated[int, Field(ge=2, le=98)] = 80
     """SCHED_FIFO priority of the loop; telemetry threads get 1."""
     cpu: Annotated[int, Field(ge=0, le=4095)] | Literal["any"] = "any"
@@ -170,7 +170,7 @@ class TimingSection(Section):
     overrun: Literal["hold", "skip", "stop"] = "hold"
     """A late cycle: `hold`: count it, go on; `skip`: drop what was missed; `stop`: end the run, exit 5."""
     overrun_limit: Annotated[int, Field(ge=1, le=20)] = 5
-    """`stop` ends the run at this many late ones of 20 periods; late is half a period, or slower than one."""
+    """`stop` ends the run at this many late cycles of 20; late is half a period, or slower than one."""
 
 
 class RunSection(Section):
@@ -188,11 +188,11 @@ class Custom(Section):
     kind: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$", examples=["my_lab.rig:Mine"])]
     """`module:Class`; the module is installed, or beside the rig file, or in the current folder."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """Handed to the class as keyword arguments."""
+    """Keyword arguments for the constructor of the class."""
 
 
 class CustomController(Custom):
     """A controller of your own; the loop hands it the position that it asks for here."""
 
     position: Literal["estimated", "measured"] = "estimated"
-    """Which position the controller is given: x1_hat (quiet) or the encoder's."""
+    """Position that the controller gets: x1_hat (quiet) or the encoder's."""

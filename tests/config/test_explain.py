@@ -13,7 +13,7 @@ from tests.installed import Finished
 
 def test_explain_lists_every_key_with_value_and_meaning() -> None:
     rows = {key: (value, meaning) for key, value, meaning in explain(load_rig("bench-1khz"))}
-    assert rows["loop.rate_hz"] == ("1000", "Samples a second, Hz.")
+    assert rows["loop.rate_hz"] == ("1000", "Samples per second, Hz.")
     assert rows["observer.mu0_rad_s"][0] == "40 (by rule)"
     assert rows["observer.M_rad_s3"][0] == "15 (by rule)"
     assert all(meaning for _, meaning in rows.values())

@@ -21,7 +21,7 @@ class PdSettings(Section):
     kd_1_s: NotNegative = 130.0
     """Derivative gain of eq. (14), 1/s."""
     position: Literal["estimated", "measured"] = "estimated"
-    """Which position the proportional term takes: x1_hat (quiet) or the encoder's (as in the paper)."""
+    """Position in the proportional term: x1_hat (quiet) or the encoder's (as in the paper)."""
     friction_feedforward: bool = False
     """Tell the observer of Coulomb friction, f1 of [model], by the sign of the reference's velocity."""
 

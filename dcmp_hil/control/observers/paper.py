@@ -26,7 +26,7 @@ class PaperSettings(Section):
     M_rad_s3: Positive = 1000.0
     """Differentiator gain M of eq. (14), rad/s3."""
     start: Literal["measured", "zero"] = "measured"
-    """Where z1 begins: at the first measured position, or at 0 as in the paper."""
+    """Initial z1: the first measured position, or 0 as in the paper."""
 
     def build(self, context: ObserverContext) -> PaperObserver:
         """Make the observer for a rig."""

@@ -20,7 +20,7 @@ class ReferenceSettings(Section):
     """The settings that every kind of `[reference]` has."""
 
     soft_start_s: Annotated[float, Field(ge=0, le=60)] = 2.0
-    """Over this time the reference fades in from where the arm is, s; 0 = at once."""
+    """Time in which the reference fades in from the arm's position, s; 0 = at once."""
 
 
 __all__ = ["ReferenceSettings", "ReferenceSource"]

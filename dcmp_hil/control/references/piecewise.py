@@ -29,7 +29,7 @@ class Step(ReferenceSettings):
     after_rad: float = 0.5
     """Position from the step on, rad."""
     at_s: NotNegative = 5.0
-    """When the step happens, s after the start."""
+    """Instant of the step, s after the start."""
 
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
@@ -41,9 +41,9 @@ class Trapezoid(ReferenceSettings):
 
     kind: Literal["trapezoid"]
     low_rad: float = 0.0
-    """Where it starts, rad."""
+    """First position, rad."""
     high_rad: float = 1.0
-    """Where it turns, rad."""
+    """Position of the turn, rad."""
     velocity_rad_s: Positive = 1.0
     """Velocity in the middle of a move, rad/s."""
     acceleration_rad_s2: Positive = 4.0
