@@ -79,7 +79,7 @@ class RigTables(Section):
     """Settings of one rig, before the rules that span more than one table."""
 
     name: str = Field(default="rig", max_length=60, pattern=r"^\w[\w.-]*$", examples=["my-rig"])
-    """What the run's folder and the dashboard call it: up to 60 letters, digits, and . _ - inside."""
+    """Name in the run's folder and on the dashboard: up to 60 letters, digits, and . _ - inside."""
     loop: LoopSection = LoopSection()
     backend: BackendSection = Sim()
     encoder: EncoderSection = EncoderSection()

@@ -64,7 +64,7 @@ class Grant:
 
 
 class RealtimeSettings(Protocol):
-    """What a run asks of the operating system, as `[timing]` of rig.toml has it."""
+    """Requests of a run to the operating system, as in `[timing]` of rig.toml."""
 
     @property
     def realtime(self) -> Literal["try", "enforce", "off"]:
