@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from dcmp_hil.conformance.check import Check, Outcome
+    from dcmp_hil.conformance.check import DeviceCheck, Outcome
     from dcmp_hil.conformance.client import Client
     from dcmp_hil.platform.stop_request import StopRequest
 
@@ -140,7 +140,7 @@ class _Place:
         return Client(line, clock, self.node, lambda: stop.requested)
 
 
-def _chosen(checks: Sequence[Check], only: Sequence[str]) -> list[Check]:
+def _chosen(checks: Sequence[DeviceCheck], only: Sequence[str]) -> list[DeviceCheck]:
     names = {check.name for check in checks}
     unknown = [name for name in only if name not in names]
     if unknown:
@@ -169,7 +169,13 @@ def _confirm(*, yes: bool) -> None:
 
 
 def _run(
-    place: _Place, checks: Sequence[Check], *, armed: bool, clear: bool, json_to: str | None, said: Console
+    place: _Place,
+    checks: Sequence[DeviceCheck],
+    *,
+    armed: bool,
+    clear: bool,
+    json_to: str | None,
+    said: Console,
 ) -> int:
     from dcmp_hil.conformance.listener import StoppedError
     from dcmp_hil.conformance.runner import run_checks

@@ -25,7 +25,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class DeviceCheck:
     """A requirement of the page, and the function that checks it.
 
     Parameters
@@ -69,6 +69,6 @@ class Outcome:
         A sentence for each thing that is not as the page says; else the reason why it was not judged.
     """
 
-    check: Check
+    check: DeviceCheck
     verdict: Verdict
     findings: tuple[str, ...] = ()

@@ -23,7 +23,7 @@ _BEL = 0x07
 _CR = 0x0D
 
 
-class Port(Protocol):
+class RawPort(Protocol):
     """Bytes both ways."""
 
     name: str
@@ -41,7 +41,7 @@ class Port(Protocol):
         ...
 
 
-class Line(Protocol):
+class CarrierLine(Protocol):
     """A line to a device: frames over a port or a bus."""
 
     name: str
@@ -129,7 +129,7 @@ class CobsLine:
 
     carrier = COBS
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: RawPort) -> None:
         self.name, self._port = port.name, port
         self._receiver = cobs.Receiver()
         self._frames: deque[Frame] = deque()
@@ -164,7 +164,7 @@ class SlcanLine:
 
     carrier = SLCAN
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: RawPort) -> None:
         self.name, self._port = port.name, port
         self.answers: list[bytes] = []  # lines that are no frame, without CR; BEL as a line of its own
         self.damaged = 0

@@ -21,7 +21,7 @@ from dcmp_hil.wire.messages import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.conformance.lines import Line
+    from dcmp_hil.conformance.lines import CarrierLine
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
@@ -60,7 +60,7 @@ class Listener:
     """
 
     def __init__(
-        self, line: Line, clock: Clock, node: int = 0, stopping: Callable[[], bool] = lambda: False
+        self, line: CarrierLine, clock: Clock, node: int = 0, stopping: Callable[[], bool] = lambda: False
     ) -> None:
         self.line, self.clock, self.node = line, clock, node
         self._stopping = stopping

@@ -14,7 +14,7 @@ from dcmp_hil.wire.codec import CorruptFrameError, unpack
 from dcmp_hil.wire.messages import SampleReport
 
 if TYPE_CHECKING:
-    from dcmp_hil.conformance.lines import Line
+    from dcmp_hil.conformance.lines import CarrierLine
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
@@ -24,7 +24,7 @@ _SAMPLES_MIN = 3  # SAMPLEs that are no accident
 
 def open_line(
     port: str, link: str | None, *, interface: str, baud: int, bitrate: int, node: int, clock: Clock
-) -> Line:
+) -> CarrierLine:
     """Open a port and return the carrier on it.
 
     Parameters

@@ -19,9 +19,9 @@ from dcmp_hil.conformance.checks import (
 )
 
 if TYPE_CHECKING:
-    from dcmp_hil.conformance.check import Check
+    from dcmp_hil.conformance.check import DeviceCheck
 
-CHECKS: tuple[Check, ...] = (
+CHECKS: tuple[DeviceCheck, ...] = (
     *frames.CHECKS,
     *carriers.CHECKS,
     *timing.CHECKS,

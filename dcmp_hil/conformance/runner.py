@@ -14,7 +14,7 @@ from dcmp_hil.wire.messages import State
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from dcmp_hil.conformance.check import Check
+    from dcmp_hil.conformance.check import DeviceCheck
     from dcmp_hil.conformance.client import Client
 
 _ATTEMPTS_MAX = 5  # of a check during which this host was late
@@ -24,7 +24,9 @@ _IDENTIFICATION_SAMPLES = 40  # SAMPLEs at the start: whether they are of one de
 _ARMED_STATES = (State.ARMING, State.RUN)
 
 
-def run_checks(client: Client, checks: Sequence[Check], *, armed: bool, clear: bool) -> Iterator[Outcome]:
+def run_checks(
+    client: Client, checks: Sequence[DeviceCheck], *, armed: bool, clear: bool
+) -> Iterator[Outcome]:
     """Run checks in order and yield the outcome of each.
 
     Parameters
@@ -92,7 +94,7 @@ def _begin(client: Client, *, clear: bool) -> None:
         _clear(client)
 
 
-def _run(client: Client, check: Check) -> Outcome:
+def _run(client: Client, check: DeviceCheck) -> Outcome:
     """Run a check; again, if this host was late and that may be the cause of what was found."""
     outcome, late = _try(client, check)
     for _ in range(_ATTEMPTS_MAX - 1):
@@ -107,14 +109,14 @@ def _run(client: Client, check: Check) -> Outcome:
     return Outcome(check, Verdict.NOT_JUDGED, (why, *outcome.findings))
 
 
-def _try(client: Client, check: Check) -> tuple[Outcome, bool]:
+def _try(client: Client, check: DeviceCheck) -> tuple[Outcome, bool]:
     stalls = client.stalls
     outcome = _run_once(client, check)
     timed = check.timed or check.needs_arm
     return outcome, timed and outcome.verdict != Verdict.PASSED and client.stalls > stalls
 
 
-def _run_once(client: Client, check: Check) -> Outcome:
+def _run_once(client: Client, check: DeviceCheck) -> Outcome:
     findings: list[str] = []
     try:
         findings.extend(check.run(client))

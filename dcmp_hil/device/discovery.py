@@ -35,7 +35,7 @@ _KEYS_WITH_DEFAULT = ("node", "baud", "bitrate")  # that it names where they are
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class FoundDevice:
     """Result for one port or channel: a device, one of several, or no device of this project.
 
     Parameters
@@ -67,7 +67,7 @@ def find_devices(
     wait: float = LISTEN,
     *,
     history: bool = False,
-) -> Iterator[Finding]:
+) -> Iterator[FoundDevice]:
     """Yield the findings on every serial port and CAN channel, and on the named ports.
 
     It listens first, and writes nothing: it asks only where a device of ours was heard. Other people's
@@ -144,7 +144,7 @@ def _look_at(
     wait: float,
     *,
     history: bool,
-) -> Iterator[Finding]:
+) -> Iterator[FoundDevice]:
     """Try one way of speaking after the other, until a device is heard."""
     damaged = False
     try:
@@ -152,14 +152,14 @@ def _look_at(
             devices, corrupt = _ask(settings, clock, wait, history=history)
             damaged = damaged or corrupt
             for node, (words, past) in devices.items():
-                yield Finding(place, description, _keys(settings, node), words, past)
+                yield FoundDevice(place, description, _keys(settings, node), words, past)
             if devices:
                 return
     except DcmpError as error:
         remark = str(error).partition(": ")[2] or str(error)
     else:
         remark = "damaged frames: another baud rate?" if damaged else "nothing heard"
-    yield Finding(place, description, (), remark)
+    yield FoundDevice(place, description, (), remark)
 
 
 def _keys(settings: Serial | Can, node: int) -> tuple[str, ...]:

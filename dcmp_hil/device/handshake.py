@@ -12,7 +12,7 @@ from dcmp_hil.device.boot_history import history_of
 from dcmp_hil.device.client import PATIENCE
 from dcmp_hil.device.compatibility import differences, remarks
 from dcmp_hil.device.fault_clearing import Clearing
-from dcmp_hil.device.parameters import Parameters
+from dcmp_hil.device.parameters import DeviceParameters
 from dcmp_hil.errors import BackendError, ConfigError
 from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.values import Fault
@@ -86,7 +86,7 @@ class Handshake:
         self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
         self._clear = clear
         self._session = 1 + secrets.randbelow(0xFFFF)
-        self._parameters = Parameters(link.name, caller, self._session)
+        self._parameters = DeviceParameters(link.name, caller, self._session)
         self._damaged_before = 0
         self._booted_ns = 0  # the latest that a board has booted
 

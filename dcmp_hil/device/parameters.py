@@ -20,7 +20,7 @@ _COUNT_READINGS = 3  # at a count before it is taken for the arm's
 _COUNTS = 2**24  # of a SAMPLE
 
 
-class Parameters:
+class DeviceParameters:
     """Reads and sets the parameters of one device, for one session.
 
     Parameters

@@ -48,7 +48,7 @@ _SIGNALS_BYTES_MAX = 1 << 10  # of signals, that are taken at once
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class ControlSetup:
     """Arguments of the child process.
 
     Parameters
@@ -80,7 +80,7 @@ class Server:
         Process id of the run.
     """
 
-    def __init__(self, setup: Setup, mailbox: Mailbox, parent: int) -> None:
+    def __init__(self, setup: ControlSetup, mailbox: Mailbox, parent: int) -> None:
         self._rig, self._knobs = setup.rig, knobs(setup.rig)
         self._parent = parent
         self._mailbox = mailbox
@@ -293,7 +293,7 @@ def main(line: int, setup: int, parent: int) -> None:
     os.lseek(setup, 0, os.SEEK_SET)
     with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:
         connection.setblocking(False)
-        prepared: Setup = pickle.load(file)  # noqa: S301 - written by our own parent
+        prepared: ControlSetup = pickle.load(file)  # noqa: S301 - written by our own parent
         mailbox = Mailbox(mapped(prepared.mailbox, SIZE))
         try:
             path = socket_of(parent) if prepared.listen else None

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.ipc.mailbox import SIZE, Mailbox
 from dcmp_hil.ipc.run_end import AT_ZERO, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
-from dcmp_hil.live.control import Setup
+from dcmp_hil.live.control import ControlSetup
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import SIGNALS
@@ -86,7 +86,7 @@ class ControlProcess:
         if ring is None:
             return
         self._warn = warn
-        os.write(self._setup, pickle.dumps(Setup(rig, self._file, ring, self._listen)))
+        os.write(self._setup, pickle.dumps(ControlSetup(rig, self._file, ring, self._listen)))
         line, theirs = socket.socketpair()
         line.setblocking(False)
         with theirs:

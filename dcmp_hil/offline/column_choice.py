@@ -14,7 +14,7 @@ from dcmp_hil.offline.dialect import HALF
 if TYPE_CHECKING:
     from dcmp_hil.offline.column_names import Match
     from dcmp_hil.offline.recording import ColumnOptions
-    from dcmp_hil.offline.table import Table
+    from dcmp_hil.offline.table import TextTable
     from dcmp_hil.offline.units import Quantity
 
 NONE = "none"
@@ -49,7 +49,7 @@ class Columns(NamedTuple):
         return tuple(column for column in columns if column is not None)
 
 
-def choose(table: Table, options: ColumnOptions) -> Columns:
+def choose(table: TextTable, options: ColumnOptions) -> Columns:
     """Return the columns that are used.
 
     Raises
@@ -85,7 +85,7 @@ def choose(table: Table, options: ColumnOptions) -> Columns:
     return found
 
 
-def _time(table: Table, options: ColumnOptions) -> tuple[Match | None, Match | None]:
+def _time(table: TextTable, options: ColumnOptions) -> tuple[Match | None, Match | None]:
     """Return the column of the time, and that of its fraction of a second."""
     named = options.time
     if named is not None and named.lower() == NONE and NONE not in table.header:
@@ -106,7 +106,7 @@ def _time(table: Table, options: ColumnOptions) -> tuple[Match | None, Match | N
     return found if number is None else match("time", table.header, number, None), None
 
 
-def _unnamed_time(table: Table) -> Match | None:
+def _unnamed_time(table: TextTable) -> Match | None:
     """Return a first column without a name as the time, as pandas writes an index of times."""
     if table.header[0] != "1" or not table.named:
         return None
@@ -119,7 +119,7 @@ def _unnamed_time(table: Table) -> Match | None:
 
 
 def _two_columns(
-    table: Table, options: ColumnOptions, first: str, second: str
+    table: TextTable, options: ColumnOptions, first: str, second: str
 ) -> tuple[Match | None, Match | None]:
     """Return two columns that form the time together, or the finer one if both are the whole time."""
     if _is_pair(table, first, second):
@@ -130,7 +130,7 @@ def _two_columns(
     return match("time", table.header, finer, options.time_unit, table.units), None
 
 
-def _pair(table: Table, first: str, second: str, unit: str | None) -> tuple[Match | None, Match | None]:
+def _pair(table: TextTable, first: str, second: str, unit: str | None) -> tuple[Match | None, Match | None]:
     whole = match("time", table.header, first, unit or "s")
     part = match("time", table.header, second, None)
     if whole and part and part.source == "assumed":
@@ -141,7 +141,7 @@ def _pair(table: Table, first: str, second: str, unit: str | None) -> tuple[Matc
     return whole, part
 
 
-def _is_pair(table: Table, first: str, second: str) -> bool:
+def _is_pair(table: TextTable, first: str, second: str) -> bool:
     """Whether the first column holds whole seconds and the second their fraction."""
     part = match("time", table.header, second, None)
     most = round(1.0 / part.size) if part else 0
@@ -149,7 +149,7 @@ def _is_pair(table: Table, first: str, second: str) -> bool:
     return whole and all(cell.isdigit() and int(cell) < most for cell in table.column(second) if cell)
 
 
-def _input(table: Table, options: ColumnOptions) -> Match | None:
+def _input(table: TextTable, options: ColumnOptions) -> Match | None:
     named = [name for name in (options.torque, options.voltage) if name is not None]
     if options.no_input or [name for name in named if name.lower() == NONE and name not in table.header]:
         if any(name.lower() != NONE for name in named):
@@ -175,7 +175,7 @@ def _input(table: Table, options: ColumnOptions) -> Match | None:
     return found
 
 
-def _velocity(table: Table, options: ColumnOptions, notes: list[str]) -> Match | None:
+def _velocity(table: TextTable, options: ColumnOptions, notes: list[str]) -> Match | None:
     """Return the column of velocity; None if it is in doubt, since it is optional."""
     if options.velocity is not None:
         if options.velocity.lower() == NONE and NONE not in table.header:
@@ -188,17 +188,17 @@ def _velocity(table: Table, options: ColumnOptions, notes: list[str]) -> Match |
         return None
 
 
-def _find(quantity: Quantity, table: Table, options: ColumnOptions) -> Match | None:
+def _find(quantity: Quantity, table: TextTable, options: ColumnOptions) -> Match | None:
     column, unit = getattr(options, quantity), getattr(options, f"{quantity}_unit")
     return match(quantity, table.header, column, unit, table.units)
 
 
-def _missing(table: Table, quantity: Quantity, more: str) -> ConfigError:
+def _missing(table: TextTable, quantity: Quantity, more: str) -> ConfigError:
     return ConfigError(
         f"{table.path}: no column looks like {quantity}; the header has: {_header(table)}. "
         f"Name it: --{quantity} COLUMN (and its unit, if it is not SI: --{quantity}-unit).{more}"
     )
 
 
-def _header(table: Table) -> str:
+def _header(table: TextTable) -> str:
     return listed(table.header)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.offline.column_choice import Columns
     from dcmp_hil.offline.column_names import Match
-    from dcmp_hil.offline.table import Table
+    from dcmp_hil.offline.table import TextTable
 
     Column = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def read_recording(path: Path, options: ColumnOptions | None = None) -> Recordin
 
 
 def _numbers(
-    table: Table, columns: Columns, options: ColumnOptions, notes: list[str]
+    table: TextTable, columns: Columns, options: ColumnOptions, notes: list[str]
 ) -> tuple[_Values, Columns]:
     position = _column(table, columns.position)
     applied = None if columns.input is None else _column(table, columns.input)
@@ -122,14 +122,14 @@ def _numbers(
     return _Values(time, position, applied, velocity, size, period), columns
 
 
-def _column(table: Table, column: Match) -> Column:
+def _column(table: TextTable, column: Match) -> Column:
     values = numbers(table.column(column.column), table.decimal)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(values) < _VALUE_MAX, values, np.nan)
 
 
 def _time(
-    table: Table, columns: Columns, options: ColumnOptions, notes: list[str]
+    table: TextTable, columns: Columns, options: ColumnOptions, notes: list[str]
 ) -> tuple[Column, Columns, float | None]:
     """Return the stamps, the columns with what they turned out to be, and the period of even sampling."""
     column = columns.time
@@ -168,7 +168,7 @@ def _time(
     return stamps, columns, options.period
 
 
-def _known(table: Table, columns: Columns, values: _Values, notes: list[str]) -> NDArray[np.intp]:
+def _known(table: TextTable, columns: Columns, values: _Values, notes: list[str]) -> NDArray[np.intp]:
     """Return the rows that hold every number that is needed."""
     needed = [(columns.time, values.time), (columns.position, values.position), (columns.input, values.input)]
     missing = {
@@ -206,7 +206,7 @@ def _known(table: Table, columns: Columns, values: _Values, notes: list[str]) ->
 
 
 def _stamps(
-    table: Table, columns: Columns, values: _Values, known: NDArray[np.intp], options: ColumnOptions
+    table: TextTable, columns: Columns, values: _Values, known: NDArray[np.intp], options: ColumnOptions
 ) -> Stamps:
     if values.time is None or columns.time is None:
         period = options.period or math.nan

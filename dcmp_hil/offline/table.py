@@ -38,7 +38,7 @@ _RARE_ROWS_SHARE = 0.01  # share of rows
 _BEND_RATIO_MAX = 2.0  # times the sharpest bend of those rows
 
 
-class Table(NamedTuple):
+class TextTable(NamedTuple):
     """The rows of a recording as text.
 
     Parameters
@@ -76,7 +76,7 @@ class Table(NamedTuple):
         return [row[place] for row in self.rows]
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> TextTable:
     """Read a text file of columns, and leave out what is no row.
 
     Delimiter, decimal sign, header and a row of units are found; what stands before the header, between the
@@ -118,7 +118,9 @@ def read_table(path: Path) -> Table:
         numbers.pop()
         notes.append("The last line is unfinished and left out.")
     header, rows, units = _aligned(header, units, rows, layout)
-    return Table(path, header, header != _numbered(layout.width), units, rows, numbers, layout.decimal, notes)
+    return TextTable(
+        path, header, header != _numbered(layout.width), units, rows, numbers, layout.decimal, notes
+    )
 
 
 def _said(before: Sequence[Line], left_out: Sequence[Line], repeated: int) -> Iterator[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.common.drawing import files_only
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.paper.panels import FIGURES, Panel, series
+from dcmp_hil.paper.panels import FIGURES, FigurePanel, series
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,7 @@ def draw(reproduction: Reproduction, folder: Path) -> list[Path]:
     return written
 
 
-def _lay_out(figure: Figure, title: str, panels: tuple[Panel, ...], table: Table) -> None:
+def _lay_out(figure: Figure, title: str, panels: tuple[FigurePanel, ...], table: Table) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=10.0)
     grid = figure.subplots(len(panels), 2, sharex="col", squeeze=False, width_ratios=(1.0, 1.6))
     for panel, (left, right) in zip(panels, grid, strict=True):
@@ -100,7 +100,7 @@ def _lay_out(figure: Figure, title: str, panels: tuple[Panel, ...], table: Table
     figure.align_ylabels(grid[:, 1])
 
 
-def _draw_panel(left: Axes, right: Axes, panel: Panel, table: Table) -> None:
+def _draw_panel(left: Axes, right: Axes, panel: FigurePanel, table: Table) -> None:
     early = table["t"] <= _SPLIT
     _draw_lines(left, panel, table, early)
     _draw_lines(right, panel, table, ~early, panel.late_scale)
@@ -120,7 +120,9 @@ def _draw_panel(left: Axes, right: Axes, panel: Panel, table: Table) -> None:
         inset.tick_params(labelsize=7.0)
 
 
-def _draw_lines(axis: Axes, panel: Panel, table: Table, part: NDArray[np.bool_], scale: float = 1.0) -> None:
+def _draw_lines(
+    axis: Axes, panel: FigurePanel, table: Table, part: NDArray[np.bool_], scale: float = 1.0
+) -> None:
     for line in panel.lines:
         axis.plot(
             table["t"][part],

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FigureLine:
     """One line: a key of `series`, its name in the legend, its colour."""
 
     series: str
@@ -27,7 +27,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Panel:
+class FigurePanel:
     """One quantity: the first second on the left, what follows on the right.
 
     Parameters
@@ -47,7 +47,7 @@ class Panel:
     """
 
     label: str
-    lines: tuple[Line, ...]
+    lines: tuple[FigureLine, ...]
     legend: Literal["upper right", "lower right"] | None = None
     late_label: str = ""
     late_scale: float = 1.0
@@ -55,32 +55,32 @@ class Panel:
     zoom: tuple[float, float, float, float] | None = None
 
 
-_X1, _X2 = Line("x1", "$x_1$", TRUE), Line("x2", "$x_2$", TRUE)
-_X1_HAT = Line("x1_hat", r"$\hat{x}_1$", ESTIMATE, dashed=True)
-_X2_HAT = Line("x2_hat", r"$\hat{x}_2$", ESTIMATE, dashed=True)
-_XR = Line("xr", "$x_r$", REFERENCE, dashed=True)
+_X1, _X2 = FigureLine("x1", "$x_1$", TRUE), FigureLine("x2", "$x_2$", TRUE)
+_X1_HAT = FigureLine("x1_hat", r"$\hat{x}_1$", ESTIMATE, dashed=True)
+_X2_HAT = FigureLine("x2_hat", r"$\hat{x}_2$", ESTIMATE, dashed=True)
+_XR = FigureLine("xr", "$x_r$", REFERENCE, dashed=True)
 _E1, _E2 = r"$\hat{x}_1 - x_1$", r"$\hat{x}_2 - x_2$"
 
-FIGURES: dict[str, tuple[str, tuple[Panel, ...]]] = {
+FIGURES: dict[str, tuple[str, tuple[FigurePanel, ...]]] = {
     "figure-1-state.png": (
         "Figure 1. State of the servomechanism, and its estimate",
         (
-            Panel("position, rad", (_X1, _X1_HAT), "lower right", shared=True),
-            Panel("velocity, rad/s", (_X2, _X2_HAT), "upper right"),
+            FigurePanel("position, rad", (_X1, _X1_HAT), "lower right", shared=True),
+            FigurePanel("velocity, rad/s", (_X2, _X2_HAT), "upper right"),
         ),
     ),
     "figure-2-estimation-error.png": (
         "Figure 2. Estimation error; the spikes are reversals, where Coulomb friction jumps",
         (
-            Panel(
+            FigurePanel(
                 f"{_E1}, rad",
-                (Line("x1_error", "", ERROR, width=0.8),),
+                (FigureLine("x1_error", "", ERROR, width=0.8),),
                 late_label=f"{_E1}, nrad",
                 late_scale=1e9,
             ),
-            Panel(
+            FigurePanel(
                 f"{_E2}, rad/s",
-                (Line("x2_error", "", ERROR, width=0.8),),
+                (FigureLine("x2_error", "", ERROR, width=0.8),),
                 late_label=f"{_E2}, mrad/s",
                 late_scale=1e3,
             ),
@@ -89,10 +89,10 @@ FIGURES: dict[str, tuple[str, tuple[Panel, ...]]] = {
     "figure-3-tracking.png": (
         "Figure 3. Tracking of the reference, and its error",
         (
-            Panel("position, rad", (_X1, _XR), "lower right", shared=True),
-            Panel(
+            FigurePanel("position, rad", (_X1, _XR), "lower right", shared=True),
+            FigurePanel(
                 "$x_1 - x_r$, rad",
-                (Line("tracking", "", ERROR, width=0.8),),
+                (FigureLine("tracking", "", ERROR, width=0.8),),
                 late_label="$x_1 - x_r$, µrad",
                 late_scale=1e6,
             ),
@@ -101,15 +101,15 @@ FIGURES: dict[str, tuple[str, tuple[Panel, ...]]] = {
     "figure-4-control.png": (
         "Figure 4. Control signal and disturbance",
         (
-            Panel(
+            FigurePanel(
                 r"control $\tau$, V",
-                (Line("voltage", "", VOLTAGE, width=1.0),),
+                (FigureLine("voltage", "", VOLTAGE, width=1.0),),
                 zoom=(0.0, 0.5, -140.0, 60.0),
             ),
-            Panel(r"disturbance $\eta/J$, rad/s²", (Line("eta", "", TRUE),), shared=True),
-            Panel(
+            FigurePanel(r"disturbance $\eta/J$, rad/s²", (FigureLine("eta", "", TRUE),), shared=True),
+            FigurePanel(
                 "$w$, rad/s²",
-                (Line("w_hat", r"$\hat{w}$", ESTIMATE), Line("w", "$w$", TRUE)),
+                (FigureLine("w_hat", r"$\hat{w}$", ESTIMATE), FigureLine("w", "$w$", TRUE)),
                 "upper right",
             ),
         ),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Column = NDArray[np.float64]
 
 
-class Line(NamedTuple):
+class ComparisonLine(NamedTuple):
     """A figure of both runs; None if it is not known."""
 
     name: str  # with its unit
@@ -38,7 +38,7 @@ class Comparison(NamedTuple):
 
     identical: bool
     rows: int
-    figures: tuple[Line, ...]
+    figures: tuple[ComparisonLine, ...]
 
 
 def compare(recorded: RecordedRun, again: Again, start: float = 0.0) -> Comparison:
@@ -63,17 +63,17 @@ def compare(recorded: RecordedRun, again: Again, start: float = 0.0) -> Comparis
     duration = float(t[-1] - t[0]) if len(t) > 1 else 0.0
     figures = [
         *(
-            Line(
+            ComparisonLine(
                 f"{name}_error_rms_{unit}",
                 _rms(then[:, k] - true[name]),
                 _rms(now[:, k] - true[name]),
             )
             for k, (name, unit) in enumerate(zip(names, ("rad", "rad_s", "rad_s2"), strict=True))
         ),
-        Line("demand_tv_V_s", _variation(demand, duration), _variation(asked, duration)),
-        Line("velocity_difference_max_rad_s", None, _largest(now[:, 1] - then[:, 1])),
-        Line("disturbance_difference_max_rad_s2", None, _largest(now[:, 2] - then[:, 2])),
-        Line("demand_difference_max_V", None, _largest(asked - demand)),
+        ComparisonLine("demand_tv_V_s", _variation(demand, duration), _variation(asked, duration)),
+        ComparisonLine("velocity_difference_max_rad_s", None, _largest(now[:, 1] - then[:, 1])),
+        ComparisonLine("disturbance_difference_max_rad_s2", None, _largest(now[:, 2] - then[:, 2])),
+        ComparisonLine("demand_difference_max_V", None, _largest(asked - demand)),
     ]
     return Comparison(same, len(t), tuple(figures))
 

@@ -28,7 +28,7 @@ from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
 from dcmp_hil.telemetry.dispatcher import SinkDispatcher
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
-from dcmp_hil.telemetry.worker import DONE, FIGURES, UP, Setup, State
+from dcmp_hil.telemetry.worker import DONE, FIGURES, UP, WorkerSetup, WorkerState
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ class TelemetryProcess:
         self.dropped = 0
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
-        setup = Setup(
+        setup = WorkerSetup(
             _CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model, unattended, mailbox, speed
         )
         self._model = model
@@ -163,7 +163,7 @@ class TelemetryProcess:
     @property
     def behind(self) -> int:
         """Rows that the slowest sink has not taken, as the process last said; 0 before it says so."""
-        state: State | None = self._ledger.read()
+        state: WorkerState | None = self._ledger.read()
         return self.ring.written - min(state.position, state.slowest) if state else 0
 
     def event(self, event: Event) -> None:
@@ -259,7 +259,9 @@ class TelemetryProcess:
 
     def _take_over(self) -> None:
         """Continue from the last state that the process wrote: at the very end, if all is well."""
-        state: State = self._ledger.read() or State(0, 0, 0, self.figures.statistics, Lengths(), [])
+        state: WorkerState = self._ledger.read() or WorkerState(
+            0, 0, 0, self.figures.statistics, Lengths(), []
+        )
         keeper = SharedMemorySink(self._kept, state.kept) if self._kept else None
         self.figures = SummarySink(state.statistics, keeper)
         self.figures.troubles += state.troubles

@@ -43,7 +43,7 @@ _ORPHAN_CLOSE_TIMEOUT_S = 1.0  # s for those that are late where the parent is g
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class WorkerSetup:
     """Arguments of the child process.
 
     Parameters
@@ -78,7 +78,7 @@ class Setup:
     speed: float = 1.0
 
 
-class State(NamedTuple):
+class WorkerState(NamedTuple):
     """Progress of the process, from which its parent can continue in its place."""
 
     position: int  # of the ring
@@ -115,7 +115,7 @@ def main(connection: int, setup: int, terminal: int) -> None:
 
 
 class _TelemetryWorker:
-    def __init__(self, setup: Setup, channel: socket.socket, parent: int) -> None:
+    def __init__(self, setup: WorkerSetup, channel: socket.socket, parent: int) -> None:
         self._setup, self._channel, self._parent = setup, channel, parent
         self._keeper = SharedMemorySink(setup.kept) if setup.kept else None
         self._figures = SummarySink(setup.statistics, self._keeper)
@@ -199,7 +199,7 @@ class _TelemetryWorker:
         lengths = self._keeper.lengths if self._keeper else Lengths()
         figures, ring = self._figures, self._ring
         self._ledger.write(
-            State(
+            WorkerState(
                 ring.position,
                 ring.dropped,
                 self._taken,

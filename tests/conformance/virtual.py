@@ -10,7 +10,7 @@ from dcmp_hil.conformance.lines import CobsLine, SlcanLine
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dcmp_hil.conformance.lines import Line
+    from dcmp_hil.conformance.lines import CarrierLine
     from dcmp_hil.wire.frame import Frame
 
 ROOM = 4096  # bytes that a port keeps for a host that does not read
@@ -95,7 +95,7 @@ class FramePort:
 def on(device: Any, carrier: str, stopping: Callable[[], bool] = lambda: False) -> tuple[Client, Arm]:
     """Return a client of a device that was made with this carrier."""
     arm = Arm(device)
-    line: Line
+    line: CarrierLine
     if carrier == "can":
         line = FramePort(arm)
     else:

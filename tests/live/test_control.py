@@ -30,7 +30,7 @@ class _Rig:
         files = [reserve(self, "mailbox"), reserve(self, "ring")]
         self.mailbox = Mailbox(mapped(files[0], SIZE))
         self.ring = Ring(_ROWS, mapped(files[1], size_of(_ROWS)))
-        setup = control.Setup(bench(), files[0], files[1])
+        setup = control.ControlSetup(bench(), files[0], files[1])
         self.server = control.Server(setup, Mailbox(mapped(files[0], SIZE)), os.getpid())
         self.answer: int | None = APPLIED
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.drives import was_accepted
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.wire.messages import Parameter, Result, State
@@ -212,20 +212,22 @@ def not_idle(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check("arming", "7", "Ten DRIVEs at 0 V lead from IDLE to RUN.", to_run, needs_arm=True),
-    Check("arming-broken", "7", "A broken arming sequence leads to IDLE.", broken, needs_arm=True),
-    Check("arming-flags", "6", "A DRIVE with arm and another flag feeds nothing.", flags, needs_arm=True),
-    Check("arming-silent", "8", "Silence in ARMING leads to IDLE.", silent, needs_arm=True),
-    Check(
+    DeviceCheck("arming", "7", "Ten DRIVEs at 0 V lead from IDLE to RUN.", to_run, needs_arm=True),
+    DeviceCheck("arming-broken", "7", "A broken arming sequence leads to IDLE.", broken, needs_arm=True),
+    DeviceCheck(
+        "arming-flags", "6", "A DRIVE with arm and another flag feeds nothing.", flags, needs_arm=True
+    ),
+    DeviceCheck("arming-silent", "8", "Silence in ARMING leads to IDLE.", silent, needs_arm=True),
+    DeviceCheck(
         "disarm", "7", "arm = 0, clear = 1 and release = 1 end RUN at 0 V at once.", disarm, needs_arm=True
     ),
-    Check(
+    DeviceCheck(
         "stop-in-run",
         "7",
         "STOP in RUN leads to FAULT at 0 V at once, and nothing leads from FAULT to RUN.",
         stopped_in_run,
         needs_arm=True,
     ),
-    Check("second-host", "5", "A second host changes nothing in RUN.", second_host, needs_arm=True),
-    Check("parameters-in-run", "9", "PARAMETER_SET is refused in RUN.", not_idle, needs_arm=True),
+    DeviceCheck("second-host", "5", "A second host changes nothing in RUN.", second_host, needs_arm=True),
+    DeviceCheck("parameters-in-run", "9", "PARAMETER_SET is refused in RUN.", not_idle, needs_arm=True),
 )

@@ -6,7 +6,7 @@ import struct
 from binascii import crc_hqx
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.frames import FULL
 from dcmp_hil.conformance.lines import CobsLine, SlcanLine
 from dcmp_hil.conformance.terms import COBS, SLCAN
@@ -170,28 +170,28 @@ def slcan_lines(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "cobs-damage",
         "3",
         "What is no frame is one corrupt frame up to its 0x00; the next frame is heard.",
         cobs_damage,
         carriers=(COBS,),
     ),
-    Check(
+    DeviceCheck(
         "split-frames",
         "3",
         "Frames are found however the line cuts their bytes.",
         split_frames,
         carriers=(COBS, SLCAN),
     ),
-    Check(
+    DeviceCheck(
         "slcan-commands",
         "3",
         "C, O, L, S, s, V, N, F are answered as the table says.",
         slcan_commands,
         carriers=(SLCAN,),
     ),
-    Check(
+    DeviceCheck(
         "slcan-lines",
         "3",
         "A line that is not exactly as the table says is one corrupt frame, answered by BEL.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.wire.messages import Drive, State
 
@@ -126,28 +126,30 @@ def order(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "drive-accepted",
         "6",
         "A DRIVE of the owner that answers the newest SAMPLE is accepted; SAMPLE's missed says so.",
         accepted,
         timed=True,
     ),
-    Check(
+    DeviceCheck(
         "drive-refused",
         "6",
         "A DRIVE of another session, with a ttl_ms outside 5..50 or two flags feeds nothing.",
         refused,
     ),
-    Check(
+    DeviceCheck(
         "drive-age",
         "6",
         "A DRIVE that answers a SAMPLE older than 3 ms, or one to come, is refused and counted.",
         age,
         timed=True,
     ),
-    Check("drive-oldest", "6", "A DRIVE that answers a SAMPLE of 3 ms ago is accepted.", oldest, timed=True),
-    Check(
+    DeviceCheck(
+        "drive-oldest", "6", "A DRIVE that answers a SAMPLE of 3 ms ago is accepted.", oldest, timed=True
+    ),
+    DeviceCheck(
         "drive-order", "6", "A DRIVE is newer than the last accepted one, or is refused.", order, timed=True
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, SampleReport, State
@@ -137,14 +137,14 @@ def of_one_session(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "stop",
         "7",
         "STOP from any host leads to FAULT(STOPPED), said at once and every 100 ms; the first cause stays.",
         stop,
     ),
-    Check("clear", "7", "FAULT ends by clear = 0, then clear = 1, both at 0 V.", clear, timed=True),
-    Check(
+    DeviceCheck("clear", "7", "FAULT ends by clear = 0, then clear = 1, both at 0 V.", clear, timed=True),
+    DeviceCheck(
         "clear-session", "7", "Both DRIVEs that clear a fault are of one session.", of_one_session, timed=True
     ),
 )

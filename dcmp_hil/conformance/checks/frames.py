@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Hello, ParameterGet, State, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -89,14 +89,14 @@ def foreign(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "frames",
         "1",
         "Every frame of a device is a message of the table, with a right crc8 and 0 in bits without a name.",
         layout,
     ),
-    Check("wrong-crc8", "2", "A frame with a wrong crc8 is dropped and counted in HEALTH.", spoilt),
-    Check(
+    DeviceCheck("wrong-crc8", "2", "A frame with a wrong crc8 is dropped and counted in HEALTH.", spoilt),
+    DeviceCheck(
         "foreign-frames",
         "1",
         "A frame of another node, an unknown number or another length is ignored and is no error.",

@@ -6,7 +6,7 @@ import statistics
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.running import PUSH_MV, lower
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
@@ -136,12 +136,14 @@ def _leave(client: Client, session: int) -> None:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "speed-limit",
         "8",
         "Speed over 8 ms beyond the limit that a session set leads to FAULT.",
         speed,
         needs_arm=True,
     ),
-    Check("travel-origin", "8", "Travel counts from the origin that a session gave.", origin, needs_arm=True),
+    DeviceCheck(
+        "travel-origin", "8", "Travel counts from the origin that a session gave.", origin, needs_arm=True
+    ),
 )

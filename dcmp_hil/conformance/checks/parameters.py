@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.wire.messages import Parameter, Result, State
 
 if TYPE_CHECKING:
@@ -173,25 +173,25 @@ def idle_only(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check("parameters-read", "9", "Every parameter is answered, with a value in its range.", read),
-    Check(
+    DeviceCheck("parameters-read", "9", "Every parameter is answered, with a value in its range.", read),
+    DeviceCheck(
         "parameters-unknown",
         "9",
         "A parameter that does not exist is answered by value 0, UNKNOWN.",
         unknown,
     ),
-    Check(
+    DeviceCheck(
         "parameters-read-only",
         "9",
         "A parameter that cannot be set is answered by READ_ONLY and stays.",
         read_only,
     ),
-    Check(
+    DeviceCheck(
         "parameters-range",
         "9",
         "A limit can be lowered and raised again up to what the board was built with; nothing else.",
         ranges,
     ),
-    Check("parameters-owner", "9", "PARAMETER_SET is carried out for the owner only.", owner_only),
-    Check("parameters-idle", "9", "PARAMETER_SET is carried out in IDLE only.", idle_only),
+    DeviceCheck("parameters-owner", "9", "PARAMETER_SET is carried out for the owner only.", owner_only),
+    DeviceCheck("parameters-idle", "9", "PARAMETER_SET is carried out in IDLE only.", idle_only),
 )

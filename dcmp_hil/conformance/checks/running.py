@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.arming import LOW_MV, run
 from dcmp_hil.conformance.checks.drives import ROOM
 from dcmp_hil.conformance.terms import NotJudgedError
@@ -176,24 +176,24 @@ def travel(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "voltage",
         "4",
         "A voltage is applied at the tick after its DRIVE and seen in the SAMPLE after that.",
         voltage,
         needs_arm=True,
     ),
-    Check("voltage-held", "4", "Without a DRIVE the voltage is held.", held, needs_arm=True),
-    Check(
+    DeviceCheck("voltage-held", "4", "Without a DRIVE the voltage is held.", held, needs_arm=True),
+    DeviceCheck(
         "voltage-limit", "6", "A voltage beyond the limit is clamped; SAMPLE says so.", clamp, needs_arm=True
     ),
-    Check("slew", "8", "The voltage changes by no more than the slew limit.", slew, needs_arm=True),
-    Check(
+    DeviceCheck("slew", "8", "The voltage changes by no more than the slew limit.", slew, needs_arm=True),
+    DeviceCheck(
         "corrupt-link",
         "7",
         "Ten corrupt frames among the last 100 lead from RUN to FAULT.",
         corrupt_link,
         needs_arm=True,
     ),
-    Check("travel-limit", "8", "Travel beyond the limit leads to FAULT.", travel, needs_arm=True),
+    DeviceCheck("travel-limit", "8", "Travel beyond the limit leads to FAULT.", travel, needs_arm=True),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.wire.messages import Hello, Identity, Parameter, Result
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -201,11 +201,13 @@ def as_built(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check("identity", "5", "HELLO is answered by IDENTITY, which says the hash.", identity),
-    Check("ownership", "5", "One session owns the device, a second host is refused.", ownership),
-    Check("repeated-hello", "5", "A HELLO of the owner is no new ownership.", repeated_hello, timed=True),
-    Check("two-hellos", "10", "A HELLO sent twice is answered twice, and owns once.", two_hellos),
-    Check("release", "5", "A DRIVE with release = 1 ends the ownership.", release, timed=True),
-    Check("lease", "5", "Ownership ends 500 ms after the owner's last message.", lease, timed=True),
-    Check("as-built", "9", "What a session changed ends with it.", as_built, timed=True),
+    DeviceCheck("identity", "5", "HELLO is answered by IDENTITY, which says the hash.", identity),
+    DeviceCheck("ownership", "5", "One session owns the device, a second host is refused.", ownership),
+    DeviceCheck(
+        "repeated-hello", "5", "A HELLO of the owner is no new ownership.", repeated_hello, timed=True
+    ),
+    DeviceCheck("two-hellos", "10", "A HELLO sent twice is answered twice, and owns once.", two_hellos),
+    DeviceCheck("release", "5", "A DRIVE with release = 1 ends the ownership.", release, timed=True),
+    DeviceCheck("lease", "5", "Ownership ends 500 ms after the owner's last message.", lease, timed=True),
+    DeviceCheck("as-built", "9", "What a session changed ends with it.", as_built, timed=True),
 )

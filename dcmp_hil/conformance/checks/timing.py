@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.lines import SlcanLine
 from dcmp_hil.wire.messages import Edge, Health, Parameter, ParameterGet, ParameterValue, Result, State
 
@@ -159,21 +159,23 @@ def edges(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "sample-counter",
         "4",
         "One SAMPLE a period, its tick counted by one; in IDLE it says 0 V, missed, no fault.",
         counter,
     ),
-    Check("tick-parameter", "4", "TICK is the counter of SAMPLE, modulo 2^31.", tick_parameter, timed=True),
-    Check(
+    DeviceCheck(
+        "tick-parameter", "4", "TICK is the counter of SAMPLE, modulo 2^31.", tick_parameter, timed=True
+    ),
+    DeviceCheck(
         "counter-goes-on",
         "4",
         "tick counts periods, whether their SAMPLE could be sent or not.",
         counter_goes_on,
         timed=True,
     ),
-    Check("health", "4", "HEALTH comes every 100 ms, its counters never fall.", health),
-    Check("answers", "4", "Sixteen answers wait behind the reports.", answers),
-    Check("edge-stamps", "4", "EDGE comes only if EDGE_STAMPS asks for it.", edges),
+    DeviceCheck("health", "4", "HEALTH comes every 100 ms, its counters never fall.", health),
+    DeviceCheck("answers", "4", "Sixteen answers wait behind the reports.", answers),
+    DeviceCheck("edge-stamps", "4", "EDGE comes only if EDGE_STAMPS asks for it.", edges),
 )

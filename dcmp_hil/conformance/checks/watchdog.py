@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.conformance.check import Check
+from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.arming import LOW_MV, run
 from dcmp_hil.conformance.checks.running import lower
 from dcmp_hil.conformance.terms import NotJudgedError
@@ -115,14 +115,14 @@ def fed_by_nothing_else(client: Client) -> Iterator[str]:
 
 
 CHECKS = (
-    Check(
+    DeviceCheck(
         "watchdog",
         "8",
         "0 V comes after the watchdog's time, or ttl_ms, and at most one tick.",
         watchdog,
         needs_arm=True,
     ),
-    Check(
+    DeviceCheck(
         "watchdog-fed",
         "6",
         "Nothing but an accepted DRIVE feeds the watchdog.",

@@ -16,7 +16,7 @@ _NORM_MAX, _TERMS = 0.25, 11  # of the norm of A dt: the first term left out is 
 _X_MAX = 50.0  # beyond it every exponential is 0 to double precision, and cos(inf) would raise
 
 
-class Gains(NamedTuple):
+class ObserverGains(NamedTuple):
     """Correction gains of one step: v1 += k1 b, v2 += k2 b / T, v3 += k3 b / T^2."""
 
     k1: float
@@ -39,7 +39,7 @@ class Copy(NamedTuple):
     h12: float
 
 
-def matched_gains(x: float) -> Gains:
+def matched_gains(x: float) -> ObserverGains:
     """Return the gains that put the step's error poles at exp(p_i x), p_i the continuous ones.
 
     Parameters
@@ -57,7 +57,7 @@ def matched_gains(x: float) -> Gains:
     p1 = d + e1
     p3 = d * e0
     p2 = d * e1 + e0 - 0.5 * p3
-    return Gains(p1 - p2 + 0.5 * p3, p2 - p3, p3)
+    return ObserverGains(p1 - p2 + 0.5 * p3, p2 - p3, p3)
 
 
 def luenberger_copy(dt: float, f0: float, gain1: float, gain2: float) -> Copy:

@@ -10,7 +10,7 @@ from pydantic import Field
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive, Section
 from dcmp_hil.control.observers import standing_still
-from dcmp_hil.control.observers.discretisation import Gains, copy_step, luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import ObserverGains, copy_step, luenberger_copy, matched_gains
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ class SuperTwisting:
         gains = _per_step(matched_gains(self.mu0 * dt), dt)
         return (*copy_step(dt, self._f0, self._L1, self._L2), *gains)
 
-    def _sliding_gains(self, b: float, dt: float) -> Gains:
+    def _sliding_gains(self, b: float, dt: float) -> ObserverGains:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
         size = abs(b)
         mu = self.mu0 if size < _INNOVATION_MIN_RAD else (self.M / size) ** (1 / 3)
@@ -227,6 +227,6 @@ def _solve(dt: float, f0: float, L1: float, L2: float, mu0: float) -> _Step:
     return (*luenberger_copy(dt, f0, L1, L2), *_per_step(matched_gains(mu0 * dt), dt))
 
 
-def _per_step(gains: Gains, dt: float) -> Gains:
+def _per_step(gains: ObserverGains, dt: float) -> ObserverGains:
     """Scale to what b itself is multiplied with: v2 += k2 b / T, v3 += k3 b / T^2."""
-    return Gains(gains.k1, gains.k2 / dt, gains.k3 / (dt * dt))
+    return ObserverGains(gains.k1, gains.k2 / dt, gains.k3 / (dt * dt))
