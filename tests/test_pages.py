@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 _ROOT = Path(__file__).parents[1]
-_PAGES = sorted([_ROOT / "README.md", _ROOT / "firmware" / "README.md", *_ROOT.glob("docs/*.md")])
+_PAGES = sorted([*_ROOT.glob("*.md"), _ROOT / "firmware" / "README.md", *_ROOT.glob("docs/*.md")])
 _TARGETS = set(re.findall(r"^([a-z-]+):", (_ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
 
 
