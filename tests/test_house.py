@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 _ROOT = Path(__file__).parents[1]
 _RUN = {"__init__", "__main__", "api", "assembly", "fault_injection", "loop", "result", "session"}
 _SHARED_WORDS = {"backend", "errors", "stop", "values"}
+_TWICE = {"Fault", "Histogram", "Hold", "Noise", "Receiver", "Recording", "Result", "Stop"}  # to become fewer
 _HEAVY = {"can", "numpy", "pydantic", "rerun", "serial"}
 
 
@@ -58,6 +60,13 @@ def test_no_module_imports_itself_by_a_detour() -> None:
 
 def test_beside_the_rooms_are_one_run_and_the_words_that_all_share() -> None:
     assert {file.stem for file in (_ROOT / "dcmp_hil").glob("*.py")} == _RUN | _SHARED_WORDS
+
+
+def test_a_class_has_a_name_of_its_own() -> None:
+    classes = [
+        node.name for tree in _modules().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
+    ]
+    assert {name for name, count in Counter(classes).items() if count > 1} == _TWICE
 
 
 def test_no_heavy_library_stands_behind_the_loop_not_even_in_a_function() -> None:
