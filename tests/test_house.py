@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import statistics
 import subprocess
 import sys
 from collections import Counter
@@ -18,6 +19,7 @@ _ROOT = Path(__file__).parents[1]
 _RUN = {"__init__", "__main__", "api", "assembly", "fault_injection", "loop", "result", "session"}
 _SHARED_WORDS = {"backend", "errors", "stop", "values"}
 _TWICE = {"Fault", "Histogram", "Hold", "Noise", "Receiver", "Recording", "Result", "Stop"}  # to become fewer
+_MODULE_LINES_MAX, _MODULE_LINES_MEDIAN, _FUNCTION_LINES_P95 = 300, 110, 25
 _HEAVY = {"can", "numpy", "pydantic", "rerun", "serial"}
 
 
@@ -50,6 +52,30 @@ def _imports_of(tree: ast.Module, *, types: bool = True) -> set[str]:
             inner = {f"{node.module}.{alias.name}" for alias in node.names} & _modules().keys()
             found |= inner or {node.module}
     return {name if name in _modules() else name.partition(".")[0] for name in found}
+
+
+def _lines_of(folders: tuple[str, ...]) -> dict[str, int]:
+    files = [file for folder in folders for file in (_ROOT / folder).rglob("*.py")]
+    return {str(file.relative_to(_ROOT)): len(file.read_text("utf-8").splitlines()) for file in files}
+
+
+def test_modules_and_functions_are_short() -> None:
+    everything = _lines_of(("dcmp_hil", "sim_backend", "tools", "tests"))
+    assert {name: lines for name, lines in everything.items() if lines > _MODULE_LINES_MAX} == {}
+    assert statistics.median(_lines_of(("dcmp_hil", "sim_backend")).values()) <= _MODULE_LINES_MEDIAN
+    functions = [
+        (node.end_lineno or 0) - node.lineno + 1 - _docstring_lines(node)
+        for tree in _modules().values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    ]
+    assert statistics.quantiles(functions, n=20)[-1] <= _FUNCTION_LINES_P95
+
+
+def _docstring_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    first = node.body[0]
+    is_text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    return (first.end_lineno or 0) - first.lineno + 1 if is_text else 0
 
 
 def test_no_module_imports_itself_by_a_detour() -> None:

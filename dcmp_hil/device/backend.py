@@ -171,25 +171,17 @@ class DeviceBackend:
         _, voltage_mV, _, state, _, _, _ = report
         if state == _RUN and self._tick - self._answered > self._memory:
             raise open_errors.taken_over(self._link.name)
-        terms = self._terms
-        position = (self._count - self._zero) * terms.rad_per_count
+        position = (self._count - self._zero) * self._terms.rad_per_count
         fault = _HEALTHY if state == _RUN else self._fault_in(report, last)
-        return make(Sample, (self._t, position, voltage_mV / terms.mV_per_V, fault))
+        return make(Sample, (self._t, position, voltage_mV / self._terms.mV_per_V, fault))
 
     def write(self, voltage: float) -> None:
         """Send a voltage, V; a number that is not finite is sent as 0 V."""
         asked_mV = voltage * self._terms.mV_per_V
         if not -_MOST_mV <= asked_mV <= _MOST_mV:
             asked_mV = math.copysign(_MOST_mV, asked_mV) if math.isfinite(asked_mV) else 0.0
-        fields = (
-            round(asked_mV),
-            self._tick & _SEQUENCE_MASK,
-            True,
-            False,
-            False,
-            self._session,
-            self._ttl_ms,
-        )
+        sequence = self._tick & _SEQUENCE_MASK
+        fields = (round(asked_mV), sequence, True, False, False, self._session, self._ttl_ms)
         drive = make(Drive, fields)
         self._answered = self._tick
         self._link.send(pack(drive, self._node))
@@ -230,8 +222,7 @@ class DeviceBackend:
             frame = self._link.receive(0.0) if newest.state == _RUN and self._link.pending else None
             if frame is None:
                 break
-            newer = self._take(frame)
-            if newer is not None:
+            if (newer := self._take(frame)) is not None:
                 self._meter.counts.skipped += 1
                 newest = newer
         return newest

@@ -9,7 +9,6 @@ import asyncio
 import json
 import os
 import pickle
-import signal
 import socket
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,12 +21,12 @@ from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.live.connection_limits import BETWEEN, PATIENCE, Crowd, listen
 from dcmp_hil.live.run_sockets import peer_of, socket_of
+from dcmp_hil.live.run_watch import RunWatch
 from dcmp_hil.live.state import state_of
 from dcmp_hil.live.stop_command import stop_run
 from dcmp_hil.live.tunable_ranges import knobs
 from dcmp_hil.live.tunables import changed, doubts
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.platform.stop_request import SIGNALS, TAKEN
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,10 +40,7 @@ _CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change
 _POLL_PERIOD_S = 0.002  # s
 _STATE_PERIOD_S = 0.1  # s between two states that are sent to every watcher
 _CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest cycle
-_SIGNAL_CHECK_ROUNDS = 4  # rounds between two looks of the loop at its signal handlers
 _STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in, after the end
-_STARTED_MESSAGE = b"u"
-_SIGNALS_BYTES_MAX = 1 << 10  # of signals, that are taken at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,52 +220,9 @@ async def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> None:
     await writer.drain()
 
 
-class _Watch:
-    """Looks after a run: whether it lives, which signals it was sent, and that its handlers stay in place."""
-
-    def __init__(self, line: socket.socket, server: Server, mailbox: Mailbox) -> None:
-        self._line, self._server, self._mailbox = line, server, mailbox
-        self._closed = asyncio.Event()
-
-    async def until_end(self) -> None:
-        """Return when the run has ended, or its process has, and who waited for that knows."""
-        loop = asyncio.get_running_loop()
-        loop.add_reader(self._line, self._take)
-        for number in SIGNALS:  # a terminal sends them to both
-            loop.add_signal_handler(number, self._server.stop, number)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-        with suppress(OSError):
-            self._line.send(_STARTED_MESSAGE)
-        rounds = 0
-        while self._server.look() and not self._closed.is_set() and not self._mailbox.ended:
-            rounds += 1
-            if rounds % _SIGNAL_CHECK_ROUNDS == 0:
-                self._mailbox.ask_handlers()
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._closed.wait(), _CHECK_PERIOD_S)
-        await self._server.say_goodbye()
-
-    def _take(self) -> None:
-        """Read the numbers of the signals that the run received."""
-        try:
-            numbers = self._line.recv(_SIGNALS_BYTES_MAX)
-        except BlockingIOError:
-            return
-        except OSError:
-            numbers = b""
-        if not numbers:  # the run has closed its end
-            asyncio.get_running_loop().remove_reader(self._line)
-            self._closed.set()
-        for number in numbers:
-            if number & ~TAKEN in SIGNALS:
-                _ = self._server.stop(number & ~TAKEN)
-            if number & TAKEN:
-                self._mailbox.tell_taken()
-
-
 async def _serve(line: socket.socket, server: Server, mailbox: Mailbox, path: Path | None) -> None:
     """Serve at an address, or only see to the end of the run."""
-    watch = _Watch(line, server, mailbox)
+    watch = RunWatch(line, server, mailbox)
     if path is None:
         await watch.until_end()
         return
