@@ -1,4 +1,4 @@
-"""The loop: One cycle is one straight line, and everything else exists to keep it so."""
+"""The loop: one cycle is one straight line, and everything else exists to keep it so."""
 
 from __future__ import annotations
 

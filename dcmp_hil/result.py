@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Result of a run: how it ended, its summary and its files.
+    """Result of a run: its figures, columns and events, and how device and link fared.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ err = SafeConsole(stderr=True, soft_wrap=True)
 
 
 def complain(error: DcmpError) -> None:
-    """Print an error to standard error, one line for each fault in a rig."""
+    """Print an error to standard error, a line for each of its faults and notes."""
     for line in (*str(error).splitlines(), *getattr(error, "__notes__", ())):
         err.print(Text.assemble(("error: ", "bold red"), line))
 

@@ -36,7 +36,7 @@ def ports(
 ) -> None:
     """List serial ports and CAN channels, and the device on each.
 
-    The command listens first, and asks only if it receives a device of this project. A closed slcan
+    The command listens first, and asks only if it hears a device of this project. A closed slcan
     adapter stays silent, because only a command opens it: `run` and slcand do so. An open CAN adapter
     takes part in its bus: give the right --bitrate.
     """

@@ -42,7 +42,7 @@ class Kept(NamedTuple):
     why: str
 
     def document(self) -> dict[str, Any]:
-        """Return the kept files as a document for `--json`."""
+        """Return what the recording holds as a document for `--json`."""
         return self._asdict()
 
 

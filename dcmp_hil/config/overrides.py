@@ -19,7 +19,7 @@ _DEPTH_MAX = 8  # parts of a dotted key; a rig's longest has 2, a class of the u
 
 
 def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]:
-    """Apply overrides of the command line to the table of a rig.
+    """Apply overrides, of the command line or of a change, to the table of a rig.
 
     Parameters
     ----------

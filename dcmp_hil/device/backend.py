@@ -192,7 +192,7 @@ class DeviceBackend:
         return UNKNOWN_TRUTH
 
     def _give_up_after(self, gap_ns: int) -> NoReturn:
-        """Stop counting periods after a gap that is too long to count; the device has its watchdog."""
+        """Raise after a gap in which periods can no longer be counted; the device has its watchdog."""
         self._forgotten = gap_ns > _SURELY_NS
         raise open_errors.stood_still(self._link.name, 1e-9 * gap_ns)
 
@@ -283,7 +283,10 @@ class DeviceBackend:
         raise open_errors.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
 
     def _leave(self, error: BaseException | None) -> None:
-        """Disarm the device; send STOP instead after a trip, or if the device does not answer."""
+        """Disarm the device, with STOP first after a trip; send STOP alone after an error of the device.
+
+        STOP is sent as well where the device does not confirm 0 V.
+        """
         caller = DeviceClient(self._link, self._clock, self._node, self._tick)
         if isinstance(error, BackendError):
             if not self._forgotten:

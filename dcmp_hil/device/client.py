@@ -194,7 +194,7 @@ class DeviceClient:
         return message
 
     def _note(self, message: Message) -> None:
-        """Update the link counters from a message."""
+        """Store tick, fault or health from a message, and note which request it answers."""
         if isinstance(message, SampleReport):
             self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
             self.ticks.add(message)

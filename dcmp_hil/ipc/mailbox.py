@@ -46,7 +46,7 @@ STOP = 256
 
 
 class Answer(NamedTuple):
-    """Result of a change and the device time at which it was applied."""
+    """Result of a change, and the device time at which it was applied or failed."""
 
     what: int  # APPLIED, LOWERING or FAILED
     t: float  # s, device time

@@ -103,7 +103,7 @@ class Ring:
         return self.written - self.position
 
     def drain(self) -> NDArray[np.float64]:
-        """Return every row that waits, oldest first, and remove it.
+        """Return every row that this reader has not read yet, oldest first.
 
         Returns
         -------

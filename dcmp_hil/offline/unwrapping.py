@@ -173,7 +173,7 @@ def _check_half(steps: Column, modulus: float) -> None:
 def _impossible(
     position: Column, time: Column, inside: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], list[int]]:
-    """Return rows with impossible positions, and rows at which the position was set anew."""
+    """Return which rows to keep, without impossible positions, and rows where the position was set anew."""
     dt = np.diff(time)
     rate = np.diff(position) / dt
     usual = np.median(dt)

@@ -16,7 +16,7 @@ _LINE_BYTES_MAX = 1 << 16  # bytes
 
 
 class Watcher:
-    """Follows the newest run and keeps its latest state.
+    """Follows a run, the newest by default, and keeps its latest state.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def in_words(facts: dict[str, Any]) -> str:
 
 
 def contention(loadavg: str = _LOADAVG, cpus: int | None = None) -> str:
-    """Return a sentence on the number of ready threads, if it exceeds the number of processors.
+    """Return a clause on the number of ready threads, if it exceeds that of processors.
 
     Parameters
     ----------

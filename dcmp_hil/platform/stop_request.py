@@ -125,7 +125,7 @@ class StopRequest:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Hold back a second SIGINT, so that files that are being written become complete."""
+        """Let a second SIGINT interrupt nothing, so that files that are being written become complete."""
         before, self._held = self._held, True
         try:
             yield
@@ -163,7 +163,7 @@ class StopRequest:
         _handlers.discard(self)
 
     def _forget_in_fork(self) -> None:
-        """Reset the request in a forked process, whose end is not that of this run."""
+        """Restore the earlier handlers in a forked process, whose end is not that of this run."""
         self._woken_before = -1
         self._give_back()
 

@@ -194,7 +194,7 @@ class Recording:
             self._cut_at, self._cut_t = self._period, self._t
 
     def _put(self) -> None:
-        """Write the rows that wait; warn if the state of the disk changed."""
+        """Write the bytes that wait; warn if the disk became full, or takes data again."""
         waited = self._file.refused
         written = self._file.put()
         if not written and not waited:

@@ -59,7 +59,7 @@ class MotorGain(NamedTuple):
         }
 
     def told(self, t: float) -> Event:
-        """Return the event; a warning if the gain's ratio exceeds 1.25 by more than its uncertainty."""
+        """Return the event; a warning if the gain is off by more than 1.25 times and its uncertainty."""
         doubt = self.deviation / self.believed
         off = self.ratio - doubt > _GAIN_RATIO_WARNING or self.ratio + doubt < 1.0 / _GAIN_RATIO_WARNING
         said = (

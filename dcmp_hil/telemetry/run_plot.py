@@ -1,4 +1,4 @@
-"""A picture of a whole run, for runs without a viewer."""
+"""A picture of a whole run, for those who did not see it in a viewer."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ class RogueHello(RogueHost):
     """Another host wants the device."""
 
     def message(self, board: Board) -> Message:
-        """Return the message that requests the fault."""
+        """Return a HELLO of another session."""
         return Hello(self.other(board), PROTOCOL_HASH)
 
 
@@ -93,7 +93,7 @@ class RogueDrive(RogueHost):
     """Another host drives the device."""
 
     def message(self, board: Board) -> Message:
-        """Ask for a voltage."""
+        """Return a DRIVE of another session."""
         seq = (board.tick_count - 1) & _SEQUENCE_MASK
         return Drive(round(1e3 * self.number("V")), seq, True, False, False, self.other(board), 20)
 

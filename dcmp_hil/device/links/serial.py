@@ -178,12 +178,12 @@ class Port(serial.Serial):
     """A serial port that a process which is forked does not hold: it would keep the lock after our end."""
 
     def open(self) -> None:
-        """Open the link for exclusive use."""
+        """Open the port, and keep its descriptor from processes that are forked later."""
         super().open()
         keep_from_forks(self.fileno())
 
     def close(self) -> None:
-        """Close the link; closing a closed link does nothing."""
+        """Close the port; closing a closed port does nothing."""
         if self.is_open:
             forget(self.fileno())
         super().close()
