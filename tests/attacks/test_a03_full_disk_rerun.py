@@ -1,7 +1,7 @@
 """A3, the part of Rerun: a disk that is full, or a call into Rerun that never returns.
 
 Nothing of Rerun is done on the main thread, so that a run and an export hear SIGTERM and end even if Rerun
-does. The picture `run.rrd` ends while there is room for the data, and says so once. A program of ours
+does not. The picture `run.rrd` ends while there is room for the data, and says so once. A program of ours
 that serves pages ends with the process that started it.
 """
 

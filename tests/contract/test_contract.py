@@ -1,4 +1,4 @@
-"""One contract for every backend: what the loop may rely on, for every kind of read and write."""
+"""One contract for every backend: what the loop may rely on, with any device behind read and write."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a device says is checked before it is used: no answer leads to an armed motor."""
+"""What a device says is checked before it is used: no answer leads to a traceback or an armed motor."""
 
 from __future__ import annotations
 

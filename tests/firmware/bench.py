@@ -148,7 +148,7 @@ class Bench:
         return out.voltage_mV, out.enable
 
     def tick(self, times: int = 1, edge: Any = None) -> tuple[int, bool]:
-        """Run ticks; clear the frames that were sent; return voltage and ENABLE."""
+        """Run ticks; take the frames that were sent; return voltage and ENABLE."""
         out = None
         for _ in range(times):
             self.advance(self.config.period_us)

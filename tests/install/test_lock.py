@@ -87,7 +87,7 @@ def test_every_part_of_the_lock_has_a_hash() -> None:
 
 
 def _pip(version: str, folder: Path) -> Path:
-    """Create an environment with this version of pip; return its interpreter."""
+    """Create an environment with this version of pip; return its folder."""
     venv = folder / "venv"
     subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True, capture_output=True)
     wanted = ["--upgrade", "pip"] if version == "newest" else [f"pip=={version}"]

@@ -35,7 +35,7 @@ def own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @contextmanager
 def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subprocess.Popen[str]]:
-    """Start `dcmp-hil` with arguments; it is gone in the end, by any kind of end.
+    """Start `dcmp-hil` with arguments; it is ended with the context, if it has not ended by itself.
 
     `first` is the first of the ports on which recordings are served, and looked for.
     """

@@ -102,7 +102,7 @@ class HostileRun:
 
     @property
     def pid(self) -> int:
-        """Of the run's process."""
+        """Process id of the run."""
         return self.process.pid
 
     def turned(self) -> bool:

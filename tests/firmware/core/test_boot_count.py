@@ -1,4 +1,4 @@
-"""The number of a boot: it rises at every boot, whatever is lost, and few resets cost a record."""
+"""The number of a boot: it rises at every boot, with any loss of memory, and few resets cost a record."""
 
 from __future__ import annotations
 

@@ -184,7 +184,7 @@ class PwmTimer(Timer):
         return self.flag("BDTR", 12) and level == self.flag("BDTR", 13)
 
     def look_at_break(self) -> None:
-        """Disable the outputs if the break pin is low."""
+        """Disable the outputs if the break input is active, by the polarity in BDTR."""
         if self._broken():
             self.drop_flag("BDTR", 15)
             self.raise_flag("SR", 7)
