@@ -162,7 +162,7 @@ class TimingSection(Section):
     realtime: Literal["try", "enforce", "off"] = "try"
     """`try`: use what the system grants, report the rest; `enforce`: refuse to start without it, exit 5."""
     priority: Annotated[int, Field(ge=2, le=98)] = 80
-    """SCHED_FIFO priority of the loop; telemetry threads get 1."""
+    """SCHED_FIFO priority of the loop; other threads of its process get 1."""
     cpu: Annotated[int, Field(ge=0, le=4095)] | Literal["any"] = "any"
     """Number of the one CPU that the loop runs on, or "any"."""
     switch_interval_us: Annotated[int, Field(ge=20, le=5000)] = 100  # at 10 us no thread makes progress

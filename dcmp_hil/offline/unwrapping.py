@@ -20,7 +20,7 @@ _TURN = 2.0 * np.pi
 _BITS = (8, 10, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 32)
 _TURNS = (1.0, 2.0, 4.0)
 _HALF = 0.5
-_STEP_CHANGE_MAX_TURNS = 0.25
+_STEP_CHANGE_MAX_SHARE = 0.25
 """Of the modulus: so much no step differs from the two before it once the wraps are undone."""
 _JUMP_MIN_RAD = 0.5  # rad between two rows, more than the rows around it move
 _ACCELERATION_MAX_RAD_S2 = 2e4  # rad/s2: above it there is no arm
@@ -152,7 +152,7 @@ def _found(raw: Column, steps: Column, inside: NDArray[np.bool_], known: dict[fl
         if not wraps[inside].any():
             continue
         undone = steps + modulus * wraps
-        sharp = np.abs(np.diff(undone)) > _STEP_CHANGE_MAX_TURNS * modulus
+        sharp = np.abs(np.diff(undone)) > _STEP_CHANGE_MAX_SHARE * modulus
         near = wraps[1:].astype(bool) | wraps[:-1].astype(bool)
         # Where a wrap was undone the motion must go on as before: then it was one.
         if np.mean(sharp[near]) < 0.1:  # noqa: PLR2004 - a glitch may lie beside a wrap
