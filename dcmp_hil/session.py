@@ -6,13 +6,14 @@ import math
 import pickle
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.control.trajectory import LOWERING
-from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
+from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.fault_injection import inject
+from dcmp_hil.ipc.run_end import ZERO, end_after
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.sink_factories import SinkMaker
     from dcmp_hil.values import EventData, Level
-
-
-_AT_ZERO: tuple[Literal["INFO", "ERROR"], str] = ("INFO", "amplifier at 0 V")
 
 
 class Session:
@@ -150,39 +148,39 @@ class Session:
         """
         line, recorder = self._line, self._recorder
         began_ns = self._wall.now_ns()
-        end, why = _AT_ZERO, ""
+        end, why, reached, armed = ZERO, "", False, False
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
             with self.stop, self._open_telemetry(), self._realtime or nullcontext():
                 self._say_where()
-                began_ns = self._wall.now_ns()
+                began_ns, reached = self._wall.now_ns(), True
                 with line.backend:
+                    armed = True
                     self._run_line()
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
-            end, why = _end_after(seen), f"{trip} "
+            end, why = end_after(seen, reached=reached, armed=armed), f"{trip} "
             self._tell("ERROR", EventKind.TRIP, f"tripped ({trip.reason}): {trip}", CauseData(trip.reason))
             raise trip from seen.__cause__
         except DeadlineError as error:
             if recorder.recent:  # refused before it began, it is no event of the run
                 self._tell("ERROR", EventKind.DEADLINE, f"deadline: {error}", CauseData("deadline"))
-            end, why = _end_after(error), f"{error} "
+            end, why = end_after(error, reached=reached, armed=armed), f"{error} "
             raise
         except BaseException as error:
-            end, why = _end_after(error), f"{error} "
+            end, why = end_after(error, reached=reached, armed=armed), f"{error} "
             raise
         finally:
             if self._control:
                 self.stop.wake_no_more()
-                confirmed = end[0] == "INFO"
-                self._control.close(f"{why}{end[1][0].upper()}{end[1][1:]}.", confirmed=confirmed)
+                self._control.close(f"{why}{end.sentence}", end.code)
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
             recorder.link.finish(recorder.t)
             if not why:
                 self._tell_how_device_ended()
-            self._tell(end[0], EventKind.END, end[1])
+            self._tell(end.level, EventKind.END, end.words)
             recorder.close()
             if self._apart:
                 self._figures = self._apart.figures
@@ -269,15 +267,6 @@ class Session:
             changes=tuple(getattr(self._line.changes, "made", ())),
             motor_gain=self._line.supervisor.motor_gain,
         )
-
-
-def _end_after(error: BaseException) -> tuple[Literal["INFO", "ERROR"], str]:
-    """Return level and sentence on the amplifier after an error; without an answer, 0 V is not confirmed."""
-    if isinstance(error, OpenError):
-        return "INFO", "the device was not armed"
-    if isinstance(error, BackendError) or getattr(error, "__notes__", None):
-        return "ERROR", "0 V was not confirmed: the device goes there by itself"
-    return _AT_ZERO
 
 
 def _check_times(length: float, window_from: float, *, fast: bool) -> None:

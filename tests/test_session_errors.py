@@ -7,14 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from dcmp_hil.errors import BackendError, LinkError, TripError
+from dcmp_hil.errors import (
+    BackendError,
+    ConfigError,
+    DcmpError,
+    DeadlineError,
+    LinkError,
+    OpenError,
+    TripError,
+)
+from dcmp_hil.ipc.run_end import NOT_ARMED, UNCONFIRMED
 from dcmp_hil.session import Session
 from dcmp_hil.values import Estimate, Reference, Sample
 from sim_backend.backend import SimBackend
 from tests.helpers import STEADY, HeldRun, T, bench, named
+from tests.live.here import Here
 from tests.stages import ObserverAtRest, ZeroController, texts_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Self
 
 
@@ -168,3 +179,41 @@ def test_trip_before_the_first_period_stays_what_it_is(where: str) -> None:
         session.run()
     assert tuple(caught.value.cycles) == ()
     assert any("probe" in text for text in texts_of(session.result()))
+
+
+@pytest.mark.parametrize(
+    ("error", "end"),
+    [
+        (OpenError("Another host owns the device."), NOT_ARMED),
+        (ConfigError("It is another device."), NOT_ARMED),
+        (LinkError("The cable is out."), UNCONFIRMED),
+        (RuntimeError("in the handshake"), UNCONFIRMED),
+    ],
+)
+def test_run_that_never_armed_the_device_does_not_say_that_it_is_at_0_V(error: Exception, end: int) -> None:
+    """Another host may hold the voltage: the panel showed 0.00 V."""
+
+    class Refusing(SimBackend):
+        def __enter__(self) -> Self:
+            raise error
+
+    control = Here()
+    held = HeldRun(base=Refusing, control=control)
+    with pytest.raises(DcmpError):
+        held.run()
+    assert control.end == end
+    assert "at 0 V" not in control.last_words
+    assert held.session.result().events[-1].text != "amplifier at 0 V"
+
+
+def test_run_whose_sinks_cannot_be_made_does_not_say_that_the_device_is_at_0_V() -> None:
+    class Unready(Here):
+        def wait_until_up(self, stopped: Callable[[], bool]) -> None:  # noqa: ARG002
+            raise DeadlineError("It cannot be promised.")
+
+    control = Unready()
+    held = HeldRun(control=control)
+    with pytest.raises(DeadlineError):
+        held.run()
+    assert control.end == NOT_ARMED
+    assert control.last_words.endswith("The device was not armed.")

@@ -21,6 +21,7 @@ OPTION_BYTES = 0x1FFF_C000
 KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
 LOCK, START = 1 << 0, 1 << 1
 COMMANDS = LOCK | START
+RESERVED = 0xF000_0010  # 0 in every STM32F405
 BOR_LEV = 0b11 << 2  # 0b11: off, 0b10: level 1, 0b01: level 2, 0b00: level 3
 _RDP_AT, _RDP_NONE, _RDP_FOR_EVER = 8, 0xAA, 0xCC
 _NAMES = {0b11: "off", 0b10: "level 1", 0b01: "level 2", 0b00: "level 3"}
@@ -42,6 +43,11 @@ class Write(NamedTuple):
     value: int
 
 
+def is_open(word: int) -> bool:
+    """Return whether a word that was read is that of a chip without read protection."""
+    return word >> _RDP_AT & 0xFF == _RDP_NONE
+
+
 def level(word: int) -> str:
     """Return the name of an option word's brown-out level."""
     return _NAMES[(word & BOR_LEV) >> 2]
@@ -55,7 +61,8 @@ def planned(word: int) -> int | None:
     Raises
     ------
     OptionError
-        If the chip is protected against reading, or the word is none.
+        If the chip is protected against reading, the word cannot be that of an STM32F405, or a write was
+        begun and not ended: then the register holds what was to be written, and not what the chip will do.
     """
     protection = word >> _RDP_AT & 0xFF
     if protection == _RDP_FOR_EVER:
@@ -68,6 +75,16 @@ def planned(word: int) -> int | None:
             f"option word {word:#010x}: RDP is {protection:#04x}, not 0xaa. The chip is protected against "
             "reading, or the word was not read rightly. Nothing was written. Look at the wires and the "
             "supply, and try again. This program ends no protection: that erases all that is in the chip."
+        )
+    if word & RESERVED:
+        raise OptionError(
+            f"option word {word:#010x}: bits are set that are 0 in an STM32F405, so the word was not read "
+            "rightly, or the chip is another. Nothing was written. Look at the wires, and try again."
+        )
+    if word & COMMANDS != LOCK:
+        raise OptionError(
+            f"option word {word:#010x}: a write was begun and not ended. Nothing was written now. Switch the "
+            "board's supply off and on, and call this again."
         )
     if not word & BOR_LEV:
         return None

@@ -194,43 +194,56 @@ def _read(command: list[str], file: Path) -> int:
     return int.from_bytes(data, "little")
 
 
-def _check_brown_out(file: Path, port: str) -> None:
-    """Look at the brown-out level over the boot loader; say so where it is not level 3."""
-    level = brown_out.level(_read(brown_out.read_by_boot_loader(file, _TALK, port), file))
-    if level != "level 3":
-        sys.stderr.write(
-            f"warning: the chip's brown-out level is {level}, but it writes flash memory safely from 2.7 V "
-            "on only (level 3). A debug probe sets it: --by pyocd --only brown-out.\n"
-        )
+def _check_brown_out(word: int, only: str | None) -> None:
+    """Say where the brown-out level is not level 3; where it was all that was asked for, fail."""
+    known = brown_out.is_open(word)
+    said = f"is {brown_out.level(word)}" if known else f"is not known (the option bytes read as {word:#010x})"
+    if known and brown_out.level(word) == "level 3":
+        return
+    sentence = (
+        f"the chip's brown-out level {said}, but it writes flash memory safely from 2.7 V on only (level 3). "
+        "A debug probe sets it: --by pyocd --only brown-out."
+    )
+    if only == "brown-out":
+        raise OptionError(sentence)
+    sys.stderr.write(f"warning: {sentence}\n")
 
 
 def _set_brown_out(file: Path) -> None:
     """Set brown-out level 3 over a debug probe, where it is another."""
-    settings = brown_out.planned(_read(brown_out.read_by_probe(file), file))
+    before = _read(brown_out.read_by_probe(file), file)
+    settings = brown_out.planned(before)
     if settings is None:
+        sys.stdout.write("brown-out level: level 3\n")
         return
     if not _read(brown_out.hold_by_probe(file), file) & brown_out.HALTED:
         raise OptionError(
             "the processor did not halt, so that its program could disturb the write. Nothing was written. "
             "Connect the probe's reset line, and try again."
         )
-    _do(brown_out.write_by_probe(settings), dry_run=False)
+    try:
+        _do(brown_out.write_by_probe(settings), dry_run=False)
+    except RuntimeError as error:
+        raise OptionError(
+            f"{error} The option word may have been written, and the processor may be halted: the motor is "
+            "off then. Switch the board's supply off and on, and call this again."
+        ) from None
     brown_out.check_written(settings, _read(brown_out.read_by_probe(file), file))
+    sys.stdout.write(f"brown-out level: level 3 (it was {brown_out.level(before)})\n")
 
 
 def _brown_out(asked: argparse.Namespace, file: Path) -> None:
+    """Set the level where a probe may; look at it where only a part is flashed, or by the boot loader."""
+    by_probe = asked.by == "pyocd"
+    read = (
+        brown_out.read_by_probe(file) if by_probe else brown_out.read_by_boot_loader(file, _TALK, asked.port)
+    )
     if asked.dry_run:
-        by_probe = asked.by == "pyocd"
-        read = (
-            brown_out.read_by_probe(file)
-            if by_probe
-            else brown_out.read_by_boot_loader(file, _TALK, asked.port)
-        )
         _do(read, dry_run=True)
-    elif asked.by == "pyocd":
+    elif by_probe and asked.only in (None, "brown-out"):
         _set_brown_out(file)
     else:
-        _check_brown_out(file, asked.port)
+        _check_brown_out(_read(read, file), asked.only)
 
 
 def main() -> int:

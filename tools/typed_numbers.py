@@ -137,7 +137,7 @@ class _Setter:
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:
         """Nothing to wait for."""
 
-    def close(self, last_words: str, *, confirmed: bool) -> None:
+    def close(self, last_words: str, end: int) -> None:
         """Nothing to end."""
 
 

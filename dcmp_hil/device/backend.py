@@ -283,10 +283,7 @@ class DeviceBackend:
         raise open_errors.no_sample(self._link.name, 1e-9 * self._patience_ns, damaged, stale)
 
     def _leave(self, error: BaseException | None) -> None:
-        """Disarm the device, with STOP first after a trip; send STOP alone after an error of the device.
-
-        STOP is sent as well where the device does not confirm 0 V.
-        """
+        """Disarm the device; STOP comes first after a trip, alone after its error, last without an answer."""
         caller = DeviceClient(self._link, self._clock, self._node, self._tick)
         if isinstance(error, BackendError):
             if not self._forgotten:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import struct
+from typing import Literal, NamedTuple
 
-LIVES, AT_ZERO, UNCONFIRMED, FORCED = range(4)
-"""Not yet; 0 V confirmed; 0 V not confirmed; signals were sent, as it did not answer STOP."""
-SAID = (AT_ZERO, UNCONFIRMED)
-"""What only the run itself says."""
+from dcmp_hil.errors import BackendError, ConfigError, OpenError
+
+LIVES, AT_ZERO, UNCONFIRMED, FORCED, NOT_ARMED = range(5)
+"""Not yet; 0 V confirmed; 0 V not confirmed; signals were sent, as it did not answer STOP; this run has not
+armed the device, so that it does not know the voltage: another host may have."""
+SAID = (AT_ZERO, UNCONFIRMED, NOT_ARMED)
+"""Codes that only the run itself writes."""
 WORD = 11
 """Place of the number in the memory, in words of 8 bytes."""
 _NUMBER = struct.Struct("q")
@@ -18,3 +22,41 @@ def end_in(file: int) -> int:
     """Return the number in the memory of descriptor `file`; `LIVES` where there is none yet."""
     data = os.pread(file, _NUMBER.size, WORD * _NUMBER.size)
     return int(_NUMBER.unpack(data)[0]) if len(data) == _NUMBER.size else LIVES
+
+
+class RunEnd(NamedTuple):
+    """Knowledge of the amplifier at the end of a run: a code, and the level and words of an event."""
+
+    code: int
+    level: Literal["INFO", "ERROR"]
+    words: str
+
+    @property
+    def sentence(self) -> str:
+        """Return the words as a sentence of their own."""
+        return f"{self.words[0].upper()}{self.words[1:]}."
+
+
+ZERO = RunEnd(AT_ZERO, "INFO", "amplifier at 0 V")
+"""The device was left in order."""
+_NOT_OURS = RunEnd(NOT_ARMED, "INFO", "the device was not armed")
+_UNKNOWN = RunEnd(UNCONFIRMED, "ERROR", "0 V was not confirmed: the device goes there by itself")
+
+
+def end_after(error: BaseException, *, reached: bool, armed: bool) -> RunEnd:
+    """Return the knowledge of the amplifier after an error.
+
+    Parameters
+    ----------
+    error
+        What ended the run.
+    reached
+        Whether the run had begun to open the device.
+    armed
+        Whether it had armed it.
+    """
+    if not reached or (not armed and isinstance(error, OpenError | ConfigError)):
+        return _NOT_OURS
+    if not armed or isinstance(error, BackendError) or getattr(error, "__notes__", None):
+        return _UNKNOWN
+    return ZERO

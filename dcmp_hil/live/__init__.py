@@ -57,8 +57,8 @@ class Control(Protocol):
         """Wait until it sees to the end of the run, before anything is armed; `stopped` ends the waiting."""
         ...
 
-    def close(self, last_words: str, *, confirmed: bool) -> None:
-        """Listen no longer, the run having ended like this; `confirmed` is whether at 0 V for sure."""
+    def close(self, last_words: str, end: int) -> None:
+        """Listen no longer: the run has ended, in words and as a code of `dcmp_hil.ipc.run_end`."""
         ...
 
 

@@ -14,7 +14,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from dcmp_hil.ipc.mailbox import SIZE, Mailbox
-from dcmp_hil.ipc.run_end import AT_ZERO, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live.control import ControlSetup
 from dcmp_hil.platform.clock import MonotonicClock
@@ -118,10 +117,10 @@ class ControlProcess:
             if select.select([self._line], [], [], _POLL_PERIOD_S)[0] or clock.now_ns() > end_ns:
                 return
 
-    def close(self, last_words: str, *, confirmed: bool) -> None:
+    def close(self, last_words: str, end: int) -> None:
         """Report the end of the run to the process, and wait for its end."""
         self._closing = True
-        self.mailbox.tell_end(last_words, AT_ZERO if confirmed else UNCONFIRMED)
+        self.mailbox.tell_end(last_words, end)
         if self._line is not None:
             forget(self._line.fileno())
             self._line.close()

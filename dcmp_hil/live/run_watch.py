@@ -1,4 +1,4 @@
-"""What the control process knows of its run: whether it lives, and which signals it received."""
+"""The control process follows its run: whether it lives, and which signals it received."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.ipc.mailbox import STOP
-from dcmp_hil.ipc.run_end import AT_ZERO, SAID
+from dcmp_hil.ipc.run_end import AT_ZERO, NOT_ARMED, SAID
 from dcmp_hil.platform.clock import MonotonicClock, pause
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def is_alive(pid: int) -> bool:
 
 
 def _last_words(mailbox: Mailbox, after: float) -> Stopped:
-    confirmed = mailbox.end == AT_ZERO
+    confirmed = mailbox.end in (AT_ZERO, NOT_ARMED)  # a run that has not armed the device moves nothing
     what = "confirmed" if confirmed else "the run ended"
     return Stopped(
         End.CONFIRMED if confirmed else End.UNCONFIRMED,

@@ -16,7 +16,7 @@ import pytest
 from dcmp_hil.device.links.serial import open_port
 from dcmp_hil.ipc.mailbox import SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
-from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, UNCONFIRMED
+from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import stop_command
 from dcmp_hil.live.control import ControlSetup, Server
@@ -54,13 +54,17 @@ def test_stop_is_a_word_that_the_loop_takes_in_the_period(by: int, said: str) ->
     result = run.run()
     assert result.summary.periods in {700, 701}
     assert run.control.mailbox.stop_taken
-    assert run.control.confirmed
+    assert run.control.end == AT_ZERO
     assert run.held.session.stop.asked_by == said
 
 
 @pytest.mark.parametrize(
     ("number", "end", "said"),
-    [(AT_ZERO, End.CONFIRMED, "confirmed after 0 ms"), (UNCONFIRMED, End.UNCONFIRMED, "the run ended after")],
+    [
+        (AT_ZERO, End.CONFIRMED, "confirmed after 0 ms"),
+        (NOT_ARMED, End.CONFIRMED, "confirmed after 0 ms"),
+        (UNCONFIRMED, End.UNCONFIRMED, "the run ended after"),
+    ],
 )
 def test_stop_tells_the_last_words(number: int, end: End, said: str) -> None:
     mailbox = Mailbox()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.control.change import Change
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.mailbox import Answer, Mailbox
+from dcmp_hil.ipc.run_end import LIVES
 from dcmp_hil.live.tunables import changed
 from tests.helpers import HeldRun
 
@@ -25,7 +26,7 @@ class Here:
         self.mailbox = Mailbox()
         self.last_words = ""
         self.signals, self.file, self.unattended = -1, None, None
-        self.confirmed = False
+        self.end = LIVES
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
         """Nothing to start."""
@@ -33,8 +34,8 @@ class Here:
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:
         """Nothing to wait for."""
 
-    def close(self, last_words: str, *, confirmed: bool) -> None:
-        self.last_words, self.confirmed = last_words, confirmed
+    def close(self, last_words: str, end: int) -> None:
+        self.last_words, self.end = last_words, end
 
 
 class ChangedRun:

@@ -12,6 +12,7 @@ import pytest
 
 from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
+from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import control
 from dcmp_hil.values import Truth
@@ -124,3 +125,34 @@ def test_what_is_no_request_ends_the_connection(rig: _Rig, tmp_path: Path, line:
 def test_change_that_is_no_list_of_texts_is_refused(rig: _Rig, tmp_path: Path, changes: object) -> None:
     (said,) = asyncio.run(rig.ask(tmp_path / "s", {"do": "set", "changes": changes}))
     assert said == {"ok": False, "said": "A change is a list of KEY=VALUE."}
+
+
+@pytest.mark.parametrize(
+    ("end", "at_zero"),
+    [(AT_ZERO, True), (UNCONFIRMED, False), (NOT_ARMED, False), (FORCED, False), (LIVES, False)],
+)
+def test_watchers_are_told_of_0_V_only_where_it_was_confirmed(
+    rig: _Rig, tmp_path: Path, end: int, at_zero: bool
+) -> None:
+    if end == FORCED:
+        rig.mailbox.tell_forced()
+    elif end != LIVES:  # as where the run's process died
+        rig.mailbox.tell_end("It ended.", end)
+    last = asyncio.run(_last_line(rig, tmp_path / "s"))
+    assert last["at_zero"] is at_zero
+    assert last["ended"]
+
+
+async def _last_line(rig: _Rig, place: Path) -> dict[str, Any]:
+    async with await asyncio.start_unix_server(rig.server.serve, place):
+        reader, writer = await asyncio.open_unix_connection(place)
+        writer.write(b'{"do": "watch"}\n')
+        await reader.readline()
+        await rig.server.say_goodbye()
+        lines = []
+        with suppress(TimeoutError):
+            while line := await asyncio.wait_for(reader.readline(), 0.5):
+                lines.append(line)
+        writer.close()
+        last: dict[str, Any] = json.loads(lines[-1])
+        return last

@@ -28,7 +28,9 @@ def install(folder: Path, word: int, **chip: Any) -> Path:
         "started": [],
         "flashed": [],
     }
-    kept.write_text(json.dumps({**fresh, "halts": True, "stubborn": False, "short": False, **chip}))
+    kept.write_text(
+        json.dumps({**fresh, "halts": True, "stubborn": False, "short": False, "dies": 99, **chip})
+    )
     for name in ("pyocd", "stm32flash"):
         tool = folder / name
         tool.write_text(f'#!/bin/sh\nexec {sys.executable} {__file__} {name} {kept} "$@"\n')
@@ -70,17 +72,21 @@ def save(chip: dict[str, Any], address: int, length: int, file: str) -> None:
     Path(file).write_bytes(word.to_bytes(4, "little")[: 1 if chip["short"] else length])
 
 
-def pyocd(chip: dict[str, Any], words: list[str]) -> None:
+def pyocd(chip: dict[str, Any], words: list[str]) -> int:
+    """Carry out the commands up to the one at which the probe is pulled out; return the exit code."""
     verb, *rest = words
     if verb == "flash":
         chip["flashed"].append(rest[rest.index("--base-address") + 1])
-        return
+        return 0
     assert verb == "commander", verb
     assert rest[:2] == ["--target", "stm32f405rg"]
     held = "resume_on_disconnect=false" in rest
     for command in (after for word, after in pairwise(rest) if word == "-c"):
         name, *arguments = command.split()
         if name == "write32":
+            chip["dies"] -= 1
+            if chip["dies"] < 0:  # the probe is pulled out
+                return 1
             write(chip, *(int(argument, 0) for argument in arguments))
         elif name == "savemem":
             save(chip, int(arguments[0], 0), int(arguments[1]), arguments[2])
@@ -89,9 +95,11 @@ def pyocd(chip: dict[str, Any], words: list[str]) -> None:
         else:
             assert name == "sleep", name
     chip["halted"] = chip["halted"] and held
+    return 0
 
 
-def stm32flash(chip: dict[str, Any], words: list[str]) -> None:
+def stm32flash(chip: dict[str, Any], words: list[str]) -> int:
+    """Read the option bytes, write a piece, or start the program; return the exit code."""
     if "-r" in words:
         assert words[words.index("-S") + 1] == "0x1fffc000:4"
         data = (chip["stored"] & 0xFFEC | 0xABCD_0000).to_bytes(4, "little")
@@ -100,10 +108,12 @@ def stm32flash(chip: dict[str, Any], words: list[str]) -> None:
         chip["flashed"].append(words[words.index("-S") + 1])
     else:
         assert "-g" in words
+    return 0
 
 
 if __name__ == "__main__":
     tool, at, *given = sys.argv[1:]
     now = chip(Path(at))
-    {"pyocd": pyocd, "stm32flash": stm32flash}[tool](now, given)
+    code = {"pyocd": pyocd, "stm32flash": stm32flash}[tool](now, given)
     Path(at).write_text(json.dumps(now))
+    sys.exit(code)

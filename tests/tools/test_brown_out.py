@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FACTORY = 0x0FFF_AAED
-BOR, COMMANDS = 0xC, 0x3
+BOR, COMMANDS, LOCKED = 0xC, 0x3, 0x1
+RESERVED = 0xF000_0010
 NONE, FOR_EVER = 0xAA, 0xCC
 
 
@@ -29,8 +31,10 @@ def judged(word: int) -> bool:
     try:
         settings = planned(word)
     except OptionError:
-        assert protection(word) != NONE
+        assert protection(word) != NONE or word & COMMANDS != LOCKED or word & RESERVED
         return False
+    assert word & COMMANDS == LOCKED
+    assert not word & RESERVED
     assert protection(word) == NONE
     if settings is None:
         assert word & BOR == 0
@@ -48,17 +52,19 @@ def test_no_word_changes_more_than_the_level_nor_locks_the_chip() -> None:
     draw = random.Random(1)
     written = 0
     for low in range(1 << 16):
-        for high in (0x0FFF, draw.getrandbits(16)):
+        for high in (0x0FFF, draw.getrandbits(12), 0x1000 | draw.getrandbits(16)):
             written += judged(high << 16 | low)
-    assert written == 2 * 256 * 3 // 4
+    assert (
+        written == 2 * 24
+    )  # RDP, both commands and a reserved bit are as they must be, and the level is not 3
 
 
-@pytest.mark.parametrize("high", [0x0000, 0xFFFF, 0x8000, 0x0001, 0x7FFF, 0xF000])
+@pytest.mark.parametrize("high", [0x0000, 0x0FFF, 0x0800, 0x0001, 0x07FF, 0x0AAA])
 def test_every_write_protection_is_left_as_it_is(high: int) -> None:
-    assert sum(judged(high << 16 | NONE << 8 | low) for low in range(256)) == 192
+    assert sum(judged(high << 16 | NONE << 8 | low) for low in range(256)) == 24
 
 
-@pytest.mark.parametrize("rest", [0x0FFF_00ED, 0xFFFF_00FF, 0, 0x0FFF_00E1])
+@pytest.mark.parametrize("rest", [0x0FFF_00ED, 0x0000_0001, 0x0FFF_00E1])
 def test_any_other_protection_is_refused(rest: int) -> None:
     for value in range(256):
         if value == NONE:
@@ -67,6 +73,23 @@ def test_any_other_protection_is_refused(rest: int) -> None:
         with pytest.raises(OptionError, match="Nothing was written") as told:
             planned(rest | value << 8)
         assert ("for ever" in str(told.value)) == (value == FOR_EVER)
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        (0x0FFF_AAE0, "begun and not ended"),  # the probe went before the start: BOR is off after a reset
+        (0x0FFF_AAE2, "begun and not ended"),
+        (0x0FFF_AAE3, "begun and not ended"),
+        (0xF123_AA15, "bits are set"),
+        (0xAAAA_AAAD, "bits are set"),
+        (0x0FFF_AAFD, "bits are set"),
+    ],
+)
+def test_word_that_does_not_say_what_the_chip_does_is_refused(word: int, said: str) -> None:
+    with pytest.raises(OptionError, match=said) as told:
+        planned(word)
+    assert "Nothing was written" in str(told.value)
 
 
 def test_factory_word_becomes_level_3() -> None:
@@ -120,7 +143,7 @@ def run(folder: Path, monkeypatch: pytest.MonkeyPatch, by: str, *options: str) -
 ALL = ["0x8004000", "0x800c000", "0x8000000"]
 
 
-@pytest.mark.parametrize("word", [FACTORY, 0x0FFE_AAE9, 0xF123_AA15])
+@pytest.mark.parametrize("word", [FACTORY, 0x0FFE_AAE9, 0x0123_AA85])
 def test_probe_sets_level_3_and_then_flashes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: int
 ) -> None:
@@ -133,7 +156,7 @@ def test_probe_sets_level_3_and_then_flashes(
 
 
 def test_chip_that_has_level_3_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = fake_programmer.install(tmp_path, 0x0FFF_AAE0)
+    kept = fake_programmer.install(tmp_path, 0x0FFF_AAE1)
     assert run(tmp_path, monkeypatch, "pyocd", "--only", "brown-out") == 0
     found = fake_programmer.chip(kept)
     assert (found["started"], found["keys"], found["flashed"]) == ([], 0, [])
@@ -183,3 +206,44 @@ def test_boot_loader_looks_and_warns(
     assert bool(told) == bool(warned)
     found = fake_programmer.chip(kept)
     assert (found["stored"], found["flashed"]) == (word | 1, ALL)
+
+
+@pytest.mark.parametrize("writes_done", range(1, 6))
+def test_probe_that_is_pulled_out_is_told_and_the_next_call_trusts_no_register(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], writes_done: int
+) -> None:
+    """After the third of them the register says level 3, and the chip has it off."""
+    kept = fake_programmer.install(tmp_path, FACTORY, dies=writes_done)
+    assert run(tmp_path, monkeypatch, "pyocd", "--only", "brown-out") == 3
+    assert "Switch the board's supply off and on" in capsys.readouterr().err
+    kept.write_text(json.dumps(fake_programmer.chip(kept) | {"dies": 99}))
+    again = run(tmp_path, monkeypatch, "pyocd", "--only", "brown-out")
+    said, refused = capsys.readouterr()
+    unlocked = 3 <= writes_done < 6
+    assert again == (3 if unlocked else 0)
+    assert ("begun and not ended" in refused) == unlocked
+    if not unlocked:
+        assert said.endswith("brown-out level: level 3 (it was off)\n")
+        assert fake_programmer.chip(kept)["stored"] & BOR == 0
+
+
+@pytest.mark.parametrize("only", ["record", "program"])
+def test_option_word_is_only_looked_at_where_a_part_is_flashed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], only: str
+) -> None:
+    kept = fake_programmer.install(tmp_path, FACTORY)
+    assert run(tmp_path, monkeypatch, "pyocd", "--only", only) == 0
+    assert "brown-out level is off" in capsys.readouterr().err
+    assert (fake_programmer.chip(kept)["started"], fake_programmer.chip(kept)["keys"]) == ([], 0)
+
+
+@pytest.mark.parametrize(
+    ("word", "code", "said"), [(FACTORY, 3, "is off"), (0x0FFF_AAE1, 0, ""), (0, 3, "is not known")]
+)
+def test_boot_loader_cannot_set_the_level_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], word: int, code: int,
+    said: str,
+) -> None:  # fmt: skip
+    fake_programmer.install(tmp_path, word)
+    assert run(tmp_path, monkeypatch, "stm32flash", "--only", "brown-out") == code
+    assert said in capsys.readouterr().err

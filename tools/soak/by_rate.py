@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import load_rig
 from dcmp_hil.cli.run_sinks import recording
+from dcmp_hil.ipc.run_end import AT_ZERO
 from dcmp_hil.live.process import ControlProcess
 from dcmp_hil.live.run_sockets import socket_of
 from dcmp_hil.recording.metadata import about, rig_json
@@ -98,7 +99,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
         wall = time.monotonic() - began
         cpu = {name: cpu_s(pid) for name, pid in pids.items()}
     apart.close()
-    control.close("The soak is over.", confirmed=True)
+    control.close("The soak is over.", AT_ZERO)
     _wait_for_end(pids["telemetry process"])
     troubles += apart.figures.troubles
     return Soaked(
