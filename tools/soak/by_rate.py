@@ -31,7 +31,7 @@ from dcmp_hil.telemetry.rerun.viewer import free_port
 from dcmp_hil.telemetry.sink_factories import sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
-from tools.soak.memory import Memory, cpu_s
+from tools.soak.memory import Memory, cpu_s, has_ended
 from tools.soak.result import Soaked, periods_in, size_mb
 from tools.soak.source import Leak, Source, a_minute, events
 
@@ -86,7 +86,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
             late = began + batch * _BATCH_S / speed - time.monotonic()
             if late > 0:
                 time.sleep(late)
-            while apart.behind > _WAITING_ROWS_MAX:
+            while apart.behind > _WAITING_ROWS_MAX and not has_ended(apart.pid):
                 time.sleep(0.005)
             t = source.write(round(_BATCH_S / rig.period))
             for event in events(batch, t):
@@ -162,8 +162,7 @@ def _watching(pid: int) -> Iterator[None]:
 
 def _wait_for_end(pid: int) -> None:
     """Wait until a process has written its files: on a busy computer longer than the end of a run waits."""
-    with suppress(OSError):
-        for _ in range(600):
-            if Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0] == "Z":
-                return
-            time.sleep(0.1)
+    for _ in range(600):
+        if has_ended(pid):
+            return
+        time.sleep(0.1)

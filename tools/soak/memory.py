@@ -41,6 +41,15 @@ class Growth:
             return float("nan")
         return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
 
+    def rise(self) -> tuple[float, float]:
+        """Return what the last minute has more than the first one after the warm-up, MB, and minutes between.
+
+        A slope of medians does not see memory that is lost at once, or late.
+        """
+        x, y = self._floor()
+        x, y = x[x >= SETTLING], y[x >= SETTLING]
+        return (float(y[-1] - y[0]), float(x[-1] - x[0])) if len(x) else (0.0, 0.0)
+
     def _floor(self) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], ...]:
         whole = np.floor(self.minutes)
         minutes = np.unique(whole)
@@ -97,6 +106,14 @@ class Memory:
 
     def _add(self, name: str, minute: float, mb: float) -> None:
         self.growth.setdefault(name, Growth()).add(minute, mb)
+
+
+def has_ended(pid: int) -> bool:
+    """Return whether a process is gone, or only its parent has not noticed yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0] in {"Z", "X"}
+    except OSError:
+        return True
 
 
 def cpu_s(pid: int) -> float:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 SLOPE_MB, TOTAL_MB = 0.2, 500.0
 """What a process may grow by in a simulated minute, and what all may take."""
+_NOISE_MB = 4.0  # that two minutes may differ by without a leak
+_LAST_LOOK_MINUTES = 2.0  # before the end, by which every process is still seen
 
 
 @dataclass(slots=True)
@@ -55,6 +57,12 @@ class Soaked:
             for name, growth in self.memory.growth.items()
             if not growth.slope() < SLOPE_MB
         ]
+        for name, growth in self.memory.growth.items():
+            rise, minutes = growth.rise()
+            if rise > SLOPE_MB * minutes + _NOISE_MB:
+                found.append(f"{name}: has {rise:.1f} MB more than {minutes:.0f} simulated minutes before")
+            if max(growth.minutes) < self.minutes - _LAST_LOOK_MINUTES:
+                found.append(f"{name}: not seen after minute {max(growth.minutes):.0f}, so it ended early")
         if not self.memory.peak_mb <= TOTAL_MB:
             found.append(f"all of them take {self.memory.peak_mb:.0f} MB")
         if self.dropped or self.recorded != self.written:
