@@ -266,12 +266,14 @@ _DISK_FULL = """
 import resource, sys
 from contextlib import suppress
 from pathlib import Path
+from dcmp_hil.cli.process_exit import leave
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW, feed
 sink = RerunSink(VIEW, Path(sys.argv[1]), "none")
 resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
 with suppress(RuntimeError):  # the end of a run may come before its disk is noticed
     feed(sink, periods=20_000)
+leave(0)  # as a command does: Python ends a thread that is stuck in Rerun by an abort
 """
 
 
