@@ -6,6 +6,7 @@ import http.cookiejar
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import urllib.request
@@ -24,22 +25,35 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _TURNS_S = 0.6  # device time after which a controller turns bad
+_PORTS_TRIED = 5
 _RATE_HZ = 250  # a busy computer is late for fewer periods
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
+
+
+def _page(pid: int) -> tuple[subprocess.Popen[str], str]:
+    """Start a page for a run; return its process and its address."""
+    said = ""
+    for _ in range(_PORTS_TRIED):  # a port that is free now may be taken before the page binds it
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        page = subprocess.Popen(  # noqa: S603 - our own
+            [sys.executable, "-m", "dcmp_hil", "panel", "--run", str(pid), "--port", str(port)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert page.stdout is not None  # noqa: S101 - it was asked for
+        if line := page.stdout.readline():
+            return page, line.split()[-1]
+        said = page.communicate()[1]
+    raise OSError(f"the page did not start: {said}")
 
 
 @contextmanager
 def serve_panel(pid: int) -> Iterator[Any]:
     """Serve a page for a run; yield what presses its STOP."""
-    with subprocess.Popen(  # noqa: S603 - our own
-        [sys.executable, "-m", "dcmp_hil", "panel", "--run", str(pid), "--port", str(20_000 + pid % 40_000)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as page:
+    page, address = _page(pid)
+    with page:
         try:
-            assert page.stdout is not None  # noqa: S101 - it was asked for
-            address = page.stdout.readline().split()[-1]
             origin = address.partition("/?")[0]
             opener = urllib.request.build_opener(
                 urllib.request.HTTPCookieProcessor(http.cookiejar.CookieJar()),
