@@ -254,7 +254,7 @@ def mutated(draw: st.DrawFn) -> tuple[dict[str, Any], set[str]]:
     return table, touched
 
 
-@settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=2000, deadline=None, suppress_health_check=list(HealthCheck))
 @given(mutated())
 def test_load_gives_rig_or_config_error_for_any_table(case: tuple[dict[str, Any], set[str]]) -> None:
     from pydantic import ValidationError
