@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest
     from dcmp_hil.plugins.roles import Role
-    from dcmp_hil.stop import Check
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
+    from dcmp_hil.trip_request import Check
     from dcmp_hil.values import Event
 
 _SETTLING_TIME_S = 0.25  # ten time constants of the observer

@@ -31,7 +31,7 @@ class Telemetry(Protocol):
         ...
 
 
-class Stop(Protocol):
+class StopFlag(Protocol):
     """Whether the end was requested."""
 
     requested: bool
@@ -55,7 +55,7 @@ class Line:
     changes: Changes = field(default_factory=NoChanges)
 
 
-def run(line: Line, until: float, stop: Stop) -> float:
+def run(line: Line, until: float, stop: StopFlag) -> float:
     """Run cycles until device time reaches `until`, or the end is requested.
 
     The backend must be open, and its owner closes it: that drives 0 V however this function ends.

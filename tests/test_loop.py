@@ -13,7 +13,7 @@ from dcmp_hil.errors import TripError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.outlier_filter import OutlierFilter
-from dcmp_hil.stop import Stop
+from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Cycle, Estimate, Reference, Sample
 from tests.helpers import STEADY, T, bench
 
@@ -27,7 +27,7 @@ class _Stages:
     def __init__(self, clock: SimulatedClock, samples: list[Sample]) -> None:
         self.calls: list[tuple[str, tuple[Any, ...]]] = []
         self.clock = clock
-        self.over: Stop | None = None
+        self.over: TripRequest | None = None
         self.trip_at = 10**9
         self._samples = iter(samples)
         self._tick = -1
@@ -55,7 +55,7 @@ class _Stages:
 
     def admit(self, *_: object) -> float:
         if self._tick >= self.trip_at:
-            self.over = Stop("because", "Seen.", "Look.")
+            self.over = TripRequest("because", "Seen.", "Look.")
             return 0.0
         return 6.0
 

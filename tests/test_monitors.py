@@ -14,7 +14,7 @@ from dcmp_hil.values import Estimate, Fault, Sample
 from tests.helpers import T, bench, setting, spoilt
 
 if TYPE_CHECKING:
-    from dcmp_hil.stop import Check
+    from dcmp_hil.trip_request import Check
 
 _SAMPLE, _ESTIMATE = Sample(1.0, 0.1, 2.0), Estimate(0.1, 0.5, -3.0)
 _NOT_FINITE = [math.nan, math.inf, -math.inf]

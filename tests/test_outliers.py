@@ -7,7 +7,7 @@ import math
 import pytest
 
 from dcmp_hil.safety.outlier_filter import OutlierFilter
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T
 
@@ -20,7 +20,7 @@ class _Bench:
         self.outliers = OutlierFilter(speed, T, COUNT)
 
     @property
-    def stop(self) -> Stop | None:
+    def stop(self) -> TripRequest | None:
         return self.outliers.check(Sample(0.0, 0.0, 0.0), Estimate(0.0, 0.0, 0.0))
 
     def rejected(self, *positions: float, step: float = T, begin: float = 0.0) -> list[bool]:

@@ -11,7 +11,7 @@ import pytest
 from dcmp_hil.errors import DeadlineError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
-from dcmp_hil.stop import Urgency
+from dcmp_hil.trip_request import Urgency
 from dcmp_hil.values import Timing
 from sim_backend.backend import SimBackend
 from tests.helpers import HeldRun, T, bench

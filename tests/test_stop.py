@@ -18,12 +18,12 @@ from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.monitors import Finite, Ranges
 from dcmp_hil.safety.polarity_check import PolarityCheck
 from dcmp_hil.safety.supervisor import Phase
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Sample, Timing
 from tests.helpers import T, bench
 
 if TYPE_CHECKING:
-    from dcmp_hil.stop import Check
+    from dcmp_hil.trip_request import Check
 
 PACKAGE = Path(dcmp_hil.__path__[0])
 SAFETY = sorted([*PACKAGE.glob("safety/*.py"), PACKAGE / "plugins" / "checked.py"])
@@ -45,7 +45,7 @@ def _checks() -> list[Check]:
 def test_a_check_raises_nothing_for_any_input(check: Check) -> None:
     for t, position, rest in product(ODD, repeat=3):
         stop = check.check(Sample(t, position, rest, 3), Estimate(position, rest, t))
-        assert stop is None or isinstance(stop, Stop)
+        assert stop is None or isinstance(stop, TripRequest)
 
 
 def test_probe_and_deadlines_raise_nothing_either() -> None:
@@ -56,7 +56,7 @@ def test_probe_and_deadlines_raise_nothing_either() -> None:
             probe.check(Sample(t, position, voltage)),
             overruns.check(Timing(t, position, voltage)),
         ):
-            assert stop is None or isinstance(stop, Stop)
+            assert stop is None or isinstance(stop, TripRequest)
 
 
 def test_no_room_of_safety_raises_a_trip_or_calls_back() -> None:
@@ -74,7 +74,7 @@ def test_no_room_of_safety_raises_a_trip_or_calls_back() -> None:
 @pytest.mark.parametrize("phase", [Phase.SETTLING, Phase.ENGAGING, Phase.RUNNING])
 def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, urgency: Urgency) -> None:
     supervisor = make_supervisor(bench("supervisor.probe=off"), lambda _: None)
-    asked, sent = Stop("because", "Seen.", "Look.", urgency), []
+    asked, sent = TripRequest("because", "Seen.", "Look.", urgency), []
     asked_at, over, k = None, None, 0
     while over is None:
         sample = Sample(k * T, 0.0, 0.0)
@@ -98,19 +98,19 @@ def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, ur
 
 def test_the_first_cause_wins_and_is_told_as_an_error() -> None:
     supervisor = make_supervisor(bench(), lambda _: None)
-    supervisor.stop(Stop("first", "One.", "Look."), 0.0)
-    supervisor.stop(Stop("second", "Two.", "Look.", Urgency.RAMP), 0.0)
-    over = supervisor.check(0.0, Stop("third", "Three.", "Look.", late=True))
+    supervisor.stop(TripRequest("first", "One.", "Look."), 0.0)
+    supervisor.stop(TripRequest("second", "Two.", "Look.", Urgency.RAMP), 0.0)
+    over = supervisor.check(0.0, TripRequest("third", "Three.", "Look.", late=True))
     assert over is not None
     assert over.reason == "first"
 
 
 def test_a_stop_becomes_the_error_of_its_exit_code() -> None:
-    late = Stop("deadline", "Late.", "Close programs.", Urgency.RAMP, late=True).error()
+    late = TripRequest("deadline", "Late.", "Close programs.", Urgency.RAMP, late=True).error()
     assert isinstance(late, DeadlineError)
     assert (str(late), late.exit_code) == ("Late. Close programs.", 5)
     cause = ValueError("mine")
-    trip = Stop("plugin", "Seen.", "Look.", cause=cause, orderly=True).error()
+    trip = TripRequest("plugin", "Seen.", "Look.", cause=cause, orderly=True).error()
     assert isinstance(trip, TripError)
     assert (trip.reason, trip.sentence, trip.remedy, trip.orderly) == ("plugin", "Seen.", "Look.", True)
     assert trip.__cause__ is cause
@@ -118,7 +118,9 @@ def test_a_stop_becomes_the_error_of_its_exit_code() -> None:
 
 
 def test_the_likely_cause_is_found_after_the_end_with_notes_kept() -> None:
-    stop = Stop("disturbance", "Seen.", "", explain=lambda: Explanation("stuck", "It stands.", "Look there."))
+    stop = TripRequest(
+        "disturbance", "Seen.", "", explain=lambda: Explanation("stuck", "It stands.", "Look there.")
+    )
     trip = stop.error()
     assert isinstance(trip, TripError)
     trip.add_note("0 V was not confirmed")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.safety.limits import Limits
 from dcmp_hil.safety.supervisor import Phase, Supervisor
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Event, EventKind, Reference, Sample
 
 _ANY, _AT_REST = Sample(0.0, 0.0, 0.0), Estimate(0.0, 0.0, 0.0)
@@ -21,8 +21,8 @@ class _Objects:
     def __init__(self, at: float, reason: str = "because") -> None:
         self.at, self._reason = at, reason
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002
-        return Stop(self._reason, "Seen.", "Look.") if sample.t >= self.at else None
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002
+        return TripRequest(self._reason, "Seen.", "Look.") if sample.t >= self.at else None
 
 
 def _supervisor(
@@ -191,7 +191,9 @@ def test_supervisor_goes_to_zero_at_once_when_a_fault_comes_into_an_orderly_end(
 def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: float) -> None:
     supervisor, _ = _supervisor(settle=0.0, engage=0.0)
     assert _period(supervisor, 0.0, -6.0)[1] == -6.0
-    assert supervisor.check(0.0, Stop("late", "Seen.", "Look.", Urgency.RAMP)) is None  # 0 V is sent first
+    assert (
+        supervisor.check(0.0, TripRequest("late", "Seen.", "Look.", Urgency.RAMP)) is None
+    )  # 0 V is sent first
     assert supervisor.stopping
     for k in range(1, 60):
         most = 6.0 * max(0.0, 1.0 - (k * _PERIOD) / 0.05)
@@ -203,7 +205,9 @@ def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: fl
 def test_supervisor_trips_at_once_when_an_orderly_end_is_asked_for_without_authority() -> None:
     supervisor, _ = _supervisor()
     _period(supervisor, 0.0, 1.0)
-    assert supervisor.check(0.0, Stop("late", "Seen.", "Look.", Urgency.RAMP)) is None  # 0 V is sent first
+    assert (
+        supervisor.check(0.0, TripRequest("late", "Seen.", "Look.", Urgency.RAMP)) is None
+    )  # 0 V is sent first
     assert _reason(supervisor) == "late"
 
 

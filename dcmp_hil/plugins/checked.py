@@ -13,7 +13,7 @@ from dcmp_hil.errors import DcmpError
 from dcmp_hil.platform.stop_request import Interrupted
 from dcmp_hil.plugins.numbers import plain_number
 from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
-from dcmp_hil.stop import Stop
+from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class CheckedObserver:
     def __init__(self, inner: Any, name: str) -> None:
         self.inner, self._name = inner, name
         self._update: Callable[[Sample], Estimate] = inner.update
-        self._failure: Stop | None = None
+        self._failure: TripRequest | None = None
 
     def update(self, sample: Sample) -> Estimate:
         """Return the estimate at `sample.t`; NaN if the observer raises, or returns none of numbers."""
@@ -60,7 +60,7 @@ class CheckedObserver:
                 return estimate
         return self._converted(estimate, sample.t)
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - as every check
         """Object if it has failed, for the reason for which it failed first."""
         return self._failure
 
@@ -97,7 +97,7 @@ class CheckedController:
     def __init__(self, inner: Any, name: str) -> None:
         self.inner, self._name = inner, name
         self._update: Callable[[Reference, Estimate], float] = inner.update
-        self._failure: Stop | None = None
+        self._failure: TripRequest | None = None
 
     def update(self, reference: Reference, estimate: Estimate) -> float:
         """Return the voltage to ask for, V; NaN if the controller raises, or returns no number."""
@@ -119,33 +119,35 @@ class CheckedController:
             self._failure = self._failure or _not_finite(self._name, self._update, number)
         return number
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - as every check
         """Object if it has failed, for the reason for which it failed first."""
         return self._failure
 
 
-def failure_of(stage: object) -> Stop | None:
+def failure_of(stage: object) -> TripRequest | None:
     """Return why a stage failed, where it is one of the user's own; None while it has not."""
-    check: Callable[[Sample, Estimate], Stop | None] | None = getattr(stage, "check", None)
+    check: Callable[[Sample, Estimate], TripRequest | None] | None = getattr(stage, "check", None)
     return check(Sample(math.nan, math.nan, math.nan), _NO_ESTIMATE) if check else None
 
 
-def _raised(name: str, method: Callable[..., Any], error: BaseException, t: float | None = None) -> Stop:
+def _raised(
+    name: str, method: Callable[..., Any], error: BaseException, t: float | None = None
+) -> TripRequest:
     where = place_of(error, file_of(method)) or place_of_code(method)
     sentence = f"{name} raised {message_of(error)}{at(where)}{_when(t)}."
-    return Stop("plugin", sentence, REMEDY, cause=error)  # for Python, which shows the traceback
+    return TripRequest("plugin", sentence, REMEDY, cause=error)  # for Python, which shows the traceback
 
 
 def _wrong(
     name: str, method: Callable[..., Any], value: object, expected: str, t: float | None = None
-) -> Stop:
+) -> TripRequest:
     where = at(place_of_code(method))
     sentence = f"{name}.update returned {shown_value(value)}{where}{_when(t)}; expected {expected}."
-    return Stop("plugin", sentence, REMEDY)
+    return TripRequest("plugin", sentence, REMEDY)
 
 
-def _not_finite(name: str, method: Callable[..., Any], value: object, t: float | None = None) -> Stop:
-    return Stop(
+def _not_finite(name: str, method: Callable[..., Any], value: object, t: float | None = None) -> TripRequest:
+    return TripRequest(
         "not_finite",
         f"{name}.update returned {shown_value(value)}{at(place_of_code(method))}{_when(t)}.",
         "Look for a division by zero, a missing value, or a gain that makes it diverge.",

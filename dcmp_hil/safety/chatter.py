@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.errors import Explanation
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -67,8 +67,8 @@ class Chatter:
         """Set the expected variation after a change of gains, V/s."""
         self._expected, self._limit = variation, limit_V_s(variation)
 
-    def judge(self, t: float, change: float) -> Stop | None:
-        """Judge the sum of |dV| of a block (V) that ends at device time `t`, s; return a Stop for chatter.
+    def judge(self, t: float, change: float) -> TripRequest | None:
+        """Judge the sum of |dV| (V) of a block that ends at `t` (s, device time); return a request to trip.
 
         That is half a second with a mean from the limit on and no pause in it; or bursts, for longer.
         """
@@ -83,14 +83,14 @@ class Chatter:
         steady = goes_on and len(rates) > _WINDOW_BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
         return self._stop(t, mean) if steady or self._bursts >= _BURST_SCORE_MAX else None
 
-    def _stop(self, t: float, mean: float) -> Stop:
+    def _stop(self, t: float, mean: float) -> TripRequest:
         said = (
             f"it changed by {mean:,.0f} V/s on average in the half second before t = {t:.3f} s; "
             f"{self._expected:,.0f} V/s are expected with this rig, {self._limit:,.0f} allowed."
         )
         sentence, remedy = _CONTROLLER
         explain = partial(self._explanation, said)
-        return Stop("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
+        return TripRequest("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
 
     def _explanation(self, said: str) -> Explanation:
         """Return the likely cause of the chatter, with its remedy."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Timing
@@ -44,8 +44,8 @@ class DeadlineMonitor:
         self._recent = 0  # a bit a period, the newest last
         self._cold = round(_WARM_UP_S / period)  # periods to go
 
-    def check(self, timing: Timing) -> Stop | None:
-        """Judge the timing of one cycle; return a Stop if too many were late."""
+    def check(self, timing: Timing) -> TripRequest | None:
+        """Judge the timing of one cycle; return a TripRequest if too many were late."""
         _, lateness, compute = timing
         punctual = self._punctual + self._leak
         behind = lateness - punctual
@@ -63,9 +63,9 @@ class DeadlineMonitor:
                 return self._too_many(timing)
         return None
 
-    def _too_many(self, timing: Timing) -> Stop:
+    def _too_many(self, timing: Timing) -> TripRequest:
         behind = timing.lateness - self._punctual
-        return Stop(
+        return TripRequest(
             "deadline",
             f"{self._recent.bit_count()} of the last {_WINDOW_PERIODS} periods of {1e6 * self._period:.0f} "
             f"us were late; the last sample by {1e6 * behind:.0f} us, its command took "

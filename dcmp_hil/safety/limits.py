@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.safety.governor import Bounds, Governor
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Event, EventKind, LimitData, Reference
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Limits:
         bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
         self._governor = Governor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
-        self._stop: Stop | None = None
+        self._stop: TripRequest | None = None
         self._slews = slew < math.inf
         self._said: dict[str, float] = {}
         self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _IN_A_ROW * period)
@@ -122,7 +122,7 @@ class Limits:
             self._judge_variation(t)
         return demand
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - as every check
         """Object if a limit has acted for too long up to this period."""
         return self._stop
 
@@ -139,7 +139,7 @@ class Limits:
         """Report a limited reference; stop if the arm is too far from the governed one."""
         x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
-            self._stop = Stop(
+            self._stop = TripRequest(
                 "tracking",
                 f"The arm has been more than {self._error:g} rad off the reference for "
                 f"{_TRACKING_ERROR_TIME_MAX_S:g} s (reference {x:.2f} rad, position {sample.position:.2f} "
@@ -180,7 +180,7 @@ class Limits:
     def _note_clamp(self, t: float, demand: float) -> None:
         self.clamped += 1
         if self._saturated.too_long(t):
-            self._stop = Stop(
+            self._stop = TripRequest(
                 "saturation",
                 f"The controller has asked for more than it may have for {_SATURATION_TIME_MAX_S:g} s "
                 f"({demand:.1f} V at t = {t:.3f} s, {self.voltage_limit:g} V allowed).",

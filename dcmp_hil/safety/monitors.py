@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.errors import Explanation
 from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.safety.diagnosis import Diagnosis
-from dcmp_hil.stop import Stop
+from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
@@ -24,15 +24,15 @@ _HEALTHY = Fault.NONE  # found here faster than in its class
 class Finite:
     """Every number of sample and estimate is finite, and the device is healthy: needed on every rig."""
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
         """Object to NaN, infinity and a device fault."""
         t, position, voltage, fault = sample
         if fault != _HEALTHY:
             sentence, remedy = meaning_of(fault)
-            return Stop("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
+            return TripRequest("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
         x1, x2, w = estimate
         if not -math.inf < t + position + voltage + x1 + x2 + w < math.inf:  # a sum with a NaN is one
-            return Stop(
+            return TripRequest(
                 "not_finite",
                 f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
                 f"estimate ({x1}, {x2}, {w}).",
@@ -62,17 +62,17 @@ class Ranges:
         self._position = position
         self._velocity, self._most, self._seen_by = velocity, velocity + spare, seen_by
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
         """Object outside the limits."""
         if not -self._most <= estimate.velocity <= self._most:
-            return Stop(
+            return TripRequest(
                 "speed",
                 f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s, by "
                 f"{self._seen_by}; the limit is {self._velocity:g} rad/s.",
                 "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
             )
         if not -self._position <= sample.position <= self._position:
-            return Stop(
+            return TripRequest(
                 "travel",
                 f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; "
                 f"the limit is {self._position:g} rad.",
@@ -125,7 +125,7 @@ class DisturbanceWatch:
         """The last 100 ms."""
         return self._diagnosis.samples
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - it has its own
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - it has its own
         """Object outside the limits, or if the disturbance was too large for too long.
 
         The stop for a disturbance can find the likely cause.
@@ -147,7 +147,7 @@ class DisturbanceWatch:
             f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
             f"the limit is {self._limit:g} rad/s2."
         )
-        return Stop(
+        return TripRequest(
             "disturbance", f"Unknown forces: {figures}", "", explain=partial(self._explanation, figures)
         )
 

@@ -6,7 +6,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from dcmp_hil.stop import Stop
+from dcmp_hil.trip_request import TripRequest
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample
@@ -37,7 +37,7 @@ class OutlierFilter:
     def __init__(self, velocity_limit: float, period: float, count: float) -> None:
         self._speed, self._floor = _VELOCITY_LIMIT_RATIO * velocity_limit, _JUMP_MIN_COUNTS * count
         self._usual = max(self._speed * period, self._floor)  # rad, from one sample to the next
-        self._stop: Stop | None = None
+        self._stop: TripRequest | None = None
         self._x = self._t = math.nan
         self._samples = 0
         self._found: deque[int] = deque(maxlen=_OUTLIERS_MAX)
@@ -51,7 +51,7 @@ class OutlierFilter:
             return False
         return self._is_off(sample)
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002 - as every check
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - as every check
         """Object if there were too many up to this sample."""
         return self._stop
 
@@ -66,7 +66,7 @@ class OutlierFilter:
         if len(self._found) < _OUTLIERS_MAX or self._samples - self._found[0] >= _WINDOW_SAMPLES:
             self.count += 1
             return True
-        self._stop = Stop(
+        self._stop = TripRequest(
             "jump",
             f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
             f"third jump within {_WINDOW_SAMPLES} samples.",

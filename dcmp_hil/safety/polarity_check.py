@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dcmp_hil.safety.diagnosis import moved_by
-from dcmp_hil.stop import Stop
+from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Event, EventKind, ProbeData
 
 if TYPE_CHECKING:
@@ -129,13 +129,13 @@ class PolarityCheck:
         """Whether the encoder is fine enough for the probe to say anything."""
         return 0.5 * self._ku * self._push * PUSH * PUSH > _PUSH_TRAVEL_MIN_COUNTS * self._count
 
-    def check(self, sample: Sample) -> Stop | None:
-        """Judge a sample; return a Stop if the rig contradicts its file.
+    def check(self, sample: Sample) -> TripRequest | None:
+        """Judge a sample; return a TripRequest if the rig contradicts its file.
 
         Reasons are ``moving``, ``power``, ``slew``, ``polarity``, ``gain`` and ``not_finite``.
         """
         if not math.isfinite(sample.t + sample.position + sample.voltage):
-            return Stop(
+            return TripRequest(
                 "not_finite",
                 f"Not every number is finite while the arm is probed: position {sample.position}, voltage "
                 f"{sample.voltage}, t = {sample.t:.3f} s.",
@@ -145,10 +145,10 @@ class PolarityCheck:
             self._began, self._x0 = sample.t, sample.position
         return self._stage(sample.t - self._began, sample)
 
-    def _watch(self, since: float, sample: Sample) -> Stop | None:
+    def _watch(self, since: float, sample: Sample) -> TripRequest | None:
         moved = sample.position - self._x0
         if not -_REST_TRAVEL_MAX_RAD <= moved <= _REST_TRAVEL_MAX_RAD:
-            return Stop(
+            return TripRequest(
                 "moving",
                 f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
                 'Bring it to rest, hanging, and start again; supervisor.probe = "off" starts without it.',
@@ -159,7 +159,7 @@ class PolarityCheck:
             self._stage, self.voltage = self._push_up, self._push
         return None
 
-    def _push_up(self, since: float, sample: Sample) -> Stop | None:
+    def _push_up(self, since: float, sample: Sample) -> TripRequest | None:
         self._seen.append((since, sample.position, sample.voltage))
         moved = abs(sample.position - self._x0)
         if not abs(sample.voltage) >= _VOLTAGE_RISEN_SHARE * self._push:
@@ -172,7 +172,7 @@ class PolarityCheck:
             self._stage, self.voltage = self._push_down, -self._push
         return None
 
-    def _push_down(self, since: float, sample: Sample) -> Stop | None:
+    def _push_down(self, since: float, sample: Sample) -> TripRequest | None:
         self._seen.append((self._length + since, sample.position, sample.voltage))
         if since < self._length and abs(sample.position - self._x0) < _RETURN_TRAVEL_MAX_RAD:
             return None
@@ -183,7 +183,7 @@ class PolarityCheck:
         return stop
 
     @np.errstate(all="ignore")  # what overflows is far from any gain, and is refused
-    def _judge(self, seen: NDArray[np.float64]) -> Stop | None:
+    def _judge(self, seen: NDArray[np.float64]) -> TripRequest | None:
         """Compare the measured motor gain with the believed one; an encoder's step is given the benefit."""
         moved = seen[1] - self._x0
         up, farthest = (
@@ -200,34 +200,34 @@ class PolarityCheck:
         if (not farthest > self._count or unclear) and not reached >= _VOLTAGE_SHARE_MIN * self._push:
             return self._too_slow(reached)
         if not farthest > self._count:
-            return Stop(
+            return TripRequest(
                 "power",
                 f"The arm does not answer: {said}.",
                 "Look at motor supply, e-stop and ENABLE, at the coupling, and at the encoder's cable.",
             )
         if not gain + unsure > 0.0:
-            return Stop(
+            return TripRequest(
                 "polarity",
                 f"The arm goes the wrong way: {said}.",
                 "Change amplifier.sign, or encoder.sign if the count falls when you lift the arm by hand.",
             )
         if not gain - unsure > 0.0:
-            return Stop(
+            return TripRequest(
                 "power",
                 f"The arm hardly answers, too little to tell which way: {said}.",
                 'Look what holds it, and at the motor supply; supervisor.probe = "off" starts without.',
             )
         if not (gain + unsure > self._ku / _GAIN_RATIO_MAX and gain - unsure < self._ku * _GAIN_RATIO_MAX):
-            return Stop(
+            return TripRequest(
                 "gain",
                 f"The arm answers {gain / self._ku:.2g} times as strongly as [model] says: {said}.",
                 "Look at encoder.counts_per_rev (after quadrature), at the gear, and at model.ku_rad_s2_V.",
             )
         return None
 
-    def _too_slow(self, reached: float) -> Stop:
-        """Return the Stop for an amplifier whose output was too low to move the arm."""
-        return Stop(
+    def _too_slow(self, reached: float) -> TripRequest:
+        """Return the TripRequest for an amplifier whose output was too low to move the arm."""
+        return TripRequest(
             "slew",
             f"The amplifier put out {reached:.2g} V of the {self._push:g} V asked for in "
             f"{self._length:.2g} s, too little to move the arm.",

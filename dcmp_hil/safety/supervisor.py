@@ -6,7 +6,7 @@ import math
 from enum import Enum, StrEnum, auto
 from typing import TYPE_CHECKING
 
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Event, EventKind, PhaseData
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.safety.limits import Limits
     from dcmp_hil.safety.polarity_check import MotorGain, PolarityCheck
-    from dcmp_hil.stop import Check
+    from dcmp_hil.trip_request import Check
     from dcmp_hil.values import Estimate, Sample
 
 
@@ -109,11 +109,11 @@ class Supervisor:
         self._probe = probe
         self._since = math.nan  # s, device time at which the present phase began
         self._push = 0.0  # V, what the probe wants
-        self._refusal: Stop | None = None  # of the probe
+        self._refusal: TripRequest | None = None  # of the probe
         self._last = 0.0  # V, what was sent last
         self._stop_from = 0.0  # V, where an orderly end begins
-        self._cause: Stop | None = None
-        self._over: Stop | None = None
+        self._cause: TripRequest | None = None
+        self._over: TripRequest | None = None
         self._has_authority = False  # in RUNNING; asked every cycle
         self.phase = Phase.ARMING
         self.stopping = False
@@ -167,7 +167,7 @@ class Supervisor:
                 self._last = voltage = 0.0
         return voltage
 
-    def check(self, t: float, late: Stop | None) -> Stop | None:
+    def check(self, t: float, late: TripRequest | None) -> TripRequest | None:
         """Return why the run is over, None if it is not; then take what was wrong with the period's timing.
 
         In that order: the loop has sent 0 V before it ends.
@@ -177,7 +177,7 @@ class Supervisor:
             self.stop(late, t)
         return over
 
-    def stop(self, cause: Stop, t: float) -> None:
+    def stop(self, cause: TripRequest, t: float) -> None:
         """Begin to end the run in the period of device time `t` (s); the first cause wins."""
         self._cause = self._cause or cause
         self._cue(Cue.FAULT if cause.urgency is Urgency.NOW else Cue.CONCERN, t)
@@ -230,8 +230,8 @@ class Supervisor:
         self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
 
 
-def _not_finite(sample: Sample, demand: float) -> Stop:
-    return Stop(
+def _not_finite(sample: Sample, demand: float) -> TripRequest:
+    return TripRequest(
         "not_finite",
         f"The controller asked for {demand} V at t = {sample.t:.3f} s.",
         "Look for a division by zero or a missing value in the controller.",

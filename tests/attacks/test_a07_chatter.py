@@ -24,7 +24,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.tunable_ranges import knobs
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.safety.chatter import FLOOR_V_S, Chatter, cause_of, limit_V_s
-from dcmp_hil.stop import Urgency
+from dcmp_hil.trip_request import Urgency
 from dcmp_hil.values import EventKind, Sample
 from tests.helpers import T, bench
 from tests.installed import environment

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.safety.limits import Limits
 from dcmp_hil.safety.monitors import Finite
 from dcmp_hil.safety.supervisor import Phase, Supervisor
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ class Objector:
 
     objects = False
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:  # noqa: ARG002
-        return Stop("test", "told to", "") if self.objects else None
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002
+        return TripRequest("test", "told to", "") if self.objects else None
 
 
 class Host:
@@ -44,7 +44,7 @@ class Host:
         self._phase, self._since = Phase.ARMING, 0.0
 
     @property
-    def over(self) -> Stop | None:
+    def over(self) -> TripRequest | None:
         """Why the run is over; None while it is not."""
         return self.supervisor.check(self.sample.t, None)
 
@@ -70,7 +70,7 @@ class Host:
         later = self.sample._replace(t=self.sample.t + 1.0, fault=Fault.NONE)
         self.objector.objects = False
         for urgency in Urgency:
-            self.supervisor.stop(Stop("test", "once more", "", urgency), later.t)
+            self.supervisor.stop(TripRequest("test", "once more", "", urgency), later.t)
         began = self.supervisor.engages(later)
         voltage = self.supervisor.admit(later, self._estimate, demand)
         if began or voltage != 0.0 or self.supervisor.phase is not Phase.TRIPPED:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from dcmp_hil.errors import BackendError
-from dcmp_hil.stop import Stop, Urgency
+from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.wire.messages import Drive, Hello, Parameter, ParameterSet
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tests.stateful.system import FAULTS, Start, System
@@ -147,7 +147,7 @@ class Machine(RuleBasedStateMachine):
     def orderly_end(self, volts: float, periods: int) -> None:
         host = self.system.host
         assert host is not None
-        host.supervisor.stop(Stop("test", "an orderly end", "", Urgency.RAMP), host.sample.t)
+        host.supervisor.stop(TripRequest("test", "an orderly end", "", Urgency.RAMP), host.sample.t)
         for _ in range(periods):
             self.system.period(volts)
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.control.observers import Observer, ObserverContext
     from dcmp_hil.control.observers.super_twisting import Tuning
-    from dcmp_hil.stop import Stop
+    from dcmp_hil.trip_request import TripRequest
     from dcmp_hil.values import Estimate, Reference, Sample
 
 _CROSSING_RAD_S = 0.005  # the sign is a ramp inside it, so that the voltage stays continuous
@@ -53,9 +53,11 @@ class KnownFriction:
         rest = self._observer.update(sample._replace(voltage=sample.voltage + held * self._volts))
         return rest._replace(disturbance=rest.disturbance + self._friction(sample.t + self._ahead))
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
         """Object if an observer of the user's own has failed."""
-        check: Callable[[Sample, Estimate], Stop | None] | None = getattr(self._observer, "check", None)
+        check: Callable[[Sample, Estimate], TripRequest | None] | None = getattr(
+            self._observer, "check", None
+        )
         return check(sample, estimate) if check else None
 
     def retune(self, tuning: Tuning) -> None:

@@ -1,4 +1,4 @@
-"""Stop: what every check of a run returns where it objects; nothing in safety says it another way."""
+"""A request to trip: every check of a run returns it where it objects; safety has no other way to say so."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Urgency(Enum):
     RAMP = auto()  # authority shrinks to 0 V within 50 ms
 
 
-class Stop(NamedTuple):
+class TripRequest(NamedTuple):
     """Why a run should end, and how fast. The supervisor decides; the loop raises the error at the end."""
 
     reason: str  # a word that stays the same from release to release
@@ -45,6 +45,6 @@ class Stop(NamedTuple):
 class Check(Protocol):
     """Protocol of a safety check that is made in every cycle."""
 
-    def check(self, sample: Sample, estimate: Estimate) -> Stop | None:
+    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
         """Return why the run must stop; None if it may go on. Raises and calls back nothing."""
         ...
