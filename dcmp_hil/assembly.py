@@ -22,7 +22,7 @@ from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
-from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
 from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.safety.polarity_check import probe_for
@@ -149,7 +149,7 @@ def make_supervisor(
     """Make the supervisor with the checks that `[supervisor]` asks for, behind those that come first."""
     chatter = chatter or make_chatter(rig)
     limits = rig.supervisor
-    clamps = make_limits(rig, notify)
+    clamps = make_limiter(rig, notify)
     checks: list[Check] = [*first, Finite()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
@@ -182,14 +182,14 @@ def make_chatter(rig: Rig) -> Chatter:
     return Chatter(expected_variation(rig), rig.period, rig.encoder.count)
 
 
-def make_limits(rig: Rig, notify: Callable[[Event], None]) -> Limits:
+def make_limiter(rig: Rig, notify: Callable[[Event], None]) -> Limiter:
     """Make the clamps on what the line asks for; with `monitors = "finite"` the voltage's alone."""
     limits, amplifier = rig.supervisor, rig.amplifier
     if limits.monitors != "all":
-        return Limits(voltage=amplifier.limit, period=rig.period, notify=notify)
+        return Limiter(voltage=amplifier.limit, period=rig.period, notify=notify)
     position, velocity = limits.reference_limits
     acceleration, braking = rig.reference_accelerations
-    return Limits(
+    return Limiter(
         voltage=amplifier.limit,
         slew=amplifier.slew,
         position=position,

@@ -104,9 +104,9 @@ def run(line: Line, until: float, stop: StopFlag) -> float:
         if supervisor.engages(sample):
             trajectory.begin(t, estimate.position)
         ahead = predictor.ahead(sample, estimate)
-        reference = supervisor.bound(sample, trajectory.at(t + delay))
+        reference = supervisor.limit_reference(sample, trajectory.at(t + delay))
         demand = controller.update(reference, ahead)
-        voltage = supervisor.admit(sample, estimate, demand)
+        voltage = supervisor.safe_voltage(sample, estimate, demand)
         backend.write(voltage)
         predictor.sent(voltage)
         left = clock.now_ns() * 1e-9

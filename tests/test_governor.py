@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dcmp_hil.control.references.periodic import Sine
-from dcmp_hil.safety.governor import Bounds, Governor
+from dcmp_hil.safety.reference_governor import Bounds, ReferenceGovernor
 from dcmp_hil.values import Reference
 
 T = 1e-3
@@ -18,7 +18,7 @@ BOUNDS = Bounds(5.969, 19.0, 44.8, 27.0, 54.0)
 
 
 def _led(source: Sine | None, periods: int = 4000, jumps: dict[int, float] | None = None) -> list[Reference]:
-    governor, found, target = Governor(BOUNDS), [], 0.0
+    governor, found, target = ReferenceGovernor(BOUNDS), [], 0.0
     for k in range(periods):
         target = (jumps or {}).get(k, target)
         asked = source.at(k * T) if source else Reference(target, 0.0, 0.0)
@@ -28,7 +28,7 @@ def _led(source: Sine | None, periods: int = 4000, jumps: dict[int, float] | Non
 
 @pytest.mark.parametrize(("amplitude", "rate"), [(1.0, 0.5), (5.96, 0.5), (1.0, 6.5), (0.04, 30.0)])
 def test_reference_that_the_arm_can_follow_passes_to_the_bit(amplitude: float, rate: float) -> None:
-    source, governor = Sine(amplitude_rad=amplitude, rate_rad_s=rate), Governor(BOUNDS)
+    source, governor = Sine(amplitude_rad=amplitude, rate_rad_s=rate), ReferenceGovernor(BOUNDS)
     for k in range(4000):
         asked = source.at(k * T)
         assert governor.bound(k * T, asked) is asked
@@ -76,7 +76,7 @@ def test_small_step_is_left_to_the_controller() -> None:
 
 def test_reference_takes_over_where_both_meet() -> None:
     source = Sine(amplitude_rad=7.0, rate_rad_s=0.5)
-    governor = Governor(BOUNDS)
+    governor = ReferenceGovernor(BOUNDS)
     led = []
     for k in range(12_000):
         governor.bound(k * T, source.at(k * T))
@@ -87,7 +87,7 @@ def test_reference_takes_over_where_both_meet() -> None:
 
 @pytest.mark.parametrize("field", ["position", "velocity", "acceleration"])
 def test_nan_stays_and_does_not_spoil_what_follows(field: str) -> None:
-    governor = Governor(BOUNDS)
+    governor = ReferenceGovernor(BOUNDS)
     fine = Reference(0.1, 0.0, 0.0)
     governor.bound(0.0, fine)
     assert math.isnan(getattr(governor.bound(T, fine._replace(**{field: math.nan})), field))

@@ -53,7 +53,7 @@ class _Stages:
         self.clock.sleep_until_ns(self._tick * 1_000_000)
         return next(self._samples)
 
-    def admit(self, *_: object) -> float:
+    def safe_voltage(self, *_: object) -> float:
         if self._tick >= self.trip_at:
             self.over = TripRequest("because", "Seen.", "Look.")
             return 0.0
@@ -79,8 +79,8 @@ class _Stages:
             supervisor=self.stage(
                 {
                     "engages": lambda _: self._tick == 1,
-                    "bound": lambda _, reference: reference,
-                    "admit": self.admit,
+                    "limit_reference": lambda _, reference: reference,
+                    "safe_voltage": self.safe_voltage,
                     "check": lambda _, __: self.over,
                 }
             ),
@@ -110,8 +110,8 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     second = stages.calls[[name for name, _ in stages.calls].index("check") + 1 :]  # which has "begin"
     names = [name for name, _ in second]
     assert names == [
-        "read", "update", "engages", "begin", "ahead", "at", "bound", "update", "admit", "write", "sent",
-        "record", "check",
+        "read", "update", "engages", "begin", "ahead", "at", "limit_reference", "update", "safe_voltage",
+        "write", "sent", "record", "check",
     ]  # fmt: skip
     given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
     sample, estimate = _SAMPLES[1], Estimate(0.25, 0.0, 0.0)

@@ -150,13 +150,13 @@ def test_the_rigs_monitors_trip_in_the_same_period_when_anything_is_not_finite(
     for k in range(5):
         sample = Sample(k * T, 0.1, 0.0)
         supervisor.engages(sample)
-        assert supervisor.admit(sample, Estimate(0.1, 0.0, 0.0), 1.0) == 1.0
+        assert supervisor.safe_voltage(sample, Estimate(0.1, 0.0, 0.0), 1.0) == 1.0
     sample, estimate = Sample(5 * T, 0.1, 0.0), Estimate(0.1, 0.0, 0.0)
     if field.startswith("estimate."):
         estimate = estimate._replace(**{field.removeprefix("estimate."): bad})
     else:
         sample = spoilt(sample, field, bad)
-    assert supervisor.admit(sample, estimate, 1.0) == 0.0
+    assert supervisor.safe_voltage(sample, estimate, 1.0) == 0.0
     over = supervisor.check(sample.t, None)
     assert over is not None
     assert (over.reason, over.orderly) == ("not_finite", False)
@@ -174,5 +174,5 @@ def test_the_rigs_limits_reach_the_monitors(
 ) -> None:
     for overrides, expected in (((f"supervisor.{key}",), reason), ((), None)):
         supervisor = make_supervisor(bench(*overrides), lambda _: None)
-        supervisor.admit(sample, estimate, 0.0)
+        supervisor.safe_voltage(sample, estimate, 0.0)
         assert getattr(supervisor.check(0.0, None), "reason", None) == expected

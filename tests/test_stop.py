@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import dcmp_hil
-from dcmp_hil.assembly import make_limits, make_outliers, make_supervisor
+from dcmp_hil.assembly import make_limiter, make_outliers, make_supervisor
 from dcmp_hil.errors import DeadlineError, Explanation, TripError
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
@@ -37,7 +37,7 @@ class _Broken:
 
 def _checks() -> list[Check]:
     rig = bench()
-    made: list[Check] = [Finite(), Ranges(1.0, 1.0), make_outliers(rig), make_limits(rig, lambda _: None)]
+    made: list[Check] = [Finite(), Ranges(1.0, 1.0), make_outliers(rig), make_limiter(rig, lambda _: None)]
     return [*made, CheckedObserver(_Broken(), "a:B"), CheckedController(_Broken(), "a:B")]
 
 
@@ -79,7 +79,7 @@ def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, ur
     while over is None:
         sample = Sample(k * T, 0.0, 0.0)
         supervisor.engages(sample)
-        sent.append(supervisor.admit(sample, Estimate(0.0, 0.0, 0.0), 1.0))
+        sent.append(supervisor.safe_voltage(sample, Estimate(0.0, 0.0, 0.0), 1.0))
         late = None
         if asked_at is None and k > 0 and supervisor.phase is phase:
             asked_at, late = k, asked
@@ -92,7 +92,7 @@ def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, ur
     assert k - 1 - asked_at <= (51 if led else 1)
     assert sent[-1] == 0.0
     assert (max(sent[asked_at + 1 :]) > 0.0) == (led and phase is Phase.RUNNING)
-    assert supervisor.admit(Sample(k * T, 0.0, 0.0), Estimate(0.0, 0.0, 0.0), 1.0) == 0.0
+    assert supervisor.safe_voltage(Sample(k * T, 0.0, 0.0), Estimate(0.0, 0.0, 0.0), 1.0) == 0.0
     assert supervisor.phase is Phase.TRIPPED
 
 

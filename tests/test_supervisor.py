@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Event, EventKind, Reference, Sample
@@ -33,7 +33,7 @@ def _supervisor(
     slew: float = math.inf,
 ) -> tuple[Supervisor, list[Event]]:
     events: list[Event] = []
-    limits = Limits(voltage=limit, slew=slew, period=_PERIOD, notify=events.append)
+    limits = Limiter(voltage=limit, slew=slew, period=_PERIOD, notify=events.append)
     made = Supervisor(monitors, limits, settle=settle, engage=engage, notify=events.append)
     return made, events
 
@@ -47,7 +47,7 @@ def _reason(supervisor: Supervisor) -> str:
 def _period(supervisor: Supervisor, t: float, demand: float) -> tuple[bool, float]:
     sample = Sample(t, 0.0, 0.0)
     engages = supervisor.engages(sample)
-    return engages, supervisor.admit(sample, _AT_REST, demand)
+    return engages, supervisor.safe_voltage(sample, _AT_REST, demand)
 
 
 def test_supervisor_goes_through_its_phases_in_order() -> None:
@@ -223,13 +223,13 @@ def test_supervisor_limits_the_slew_in_every_phase() -> None:
     assert said[0].startswith("slew limited")
 
 
-def _bound(limits: Limits, reference: Reference, t: float = 0.0, position: float = 0.0) -> Reference:
-    return limits.reference(Sample(t, position, 0.0), reference)
+def _bound(limits: Limiter, reference: Reference, t: float = 0.0, position: float = 0.0) -> Reference:
+    return limits.limit_reference(Sample(t, position, 0.0), reference)
 
 
 def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None:
     events: list[Event] = []
-    limits = Limits(voltage=10.0, period=_PERIOD, notify=events.append, position=1.9, velocity=9.5)
+    limits = Limiter(voltage=10.0, period=_PERIOD, notify=events.append, position=1.9, velocity=9.5)
     inside = Reference(1.9, -0.1, 40.0)
     assert _bound(limits, inside) is inside
     assert not events
@@ -245,14 +245,14 @@ def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None
 
 @pytest.mark.parametrize("field", ["position", "velocity"])
 def test_limits_leave_nan_in_the_reference_for_the_demand_to_show(field: str) -> None:
-    limits = Limits(
+    limits = Limiter(
         voltage=10.0, period=_PERIOD, notify=lambda _: None, position=1.9, velocity=9.5, error=1.0
     )
     assert math.isnan(getattr(_bound(limits, Reference(0.0, 0.0, 0.0)._replace(**{field: math.nan})), field))
 
 
 def test_limits_want_an_end_when_the_arm_stays_off_the_reference() -> None:
-    limits = Limits(voltage=10.0, period=_PERIOD, notify=lambda _: None, error=0.5)
+    limits = Limiter(voltage=10.0, period=_PERIOD, notify=lambda _: None, error=0.5)
     for k in range(200):  # less than half a second, again and again
         for late in range(100):
             _bound(limits, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)

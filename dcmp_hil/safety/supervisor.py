@@ -12,7 +12,7 @@ from dcmp_hil.values import Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from dcmp_hil.safety.limits import Limits
+    from dcmp_hil.safety.limiter import Limiter
     from dcmp_hil.safety.polarity_check import MotorGain, PolarityCheck
     from dcmp_hil.trip_request import Check
     from dcmp_hil.values import Estimate, Sample
@@ -82,7 +82,7 @@ class Supervisor:
     ----------
     limits
         As given.
-    bound
+    limit_reference
         What of a reference they allow.
     phase
         Where the run stands.
@@ -93,7 +93,7 @@ class Supervisor:
     def __init__(
         self,
         checks: Sequence[Check],
-        limits: Limits,
+        limits: Limiter,
         *,
         settle: float,
         engage: float,
@@ -102,8 +102,8 @@ class Supervisor:
     ) -> None:
         self._checks = tuple(one.check for one in checks)
         self.limits = limits
-        self._check_limits, self._limited = limits.check, limits.voltage
-        self.bound = limits.reference
+        self._check_limits, self._limited = limits.check, limits.limit_voltage
+        self.limit_reference = limits.limit_reference
         self._settle, self._engage = settle, engage
         self._notify = notify
         self._probe = probe
@@ -136,7 +136,7 @@ class Supervisor:
             return True
         return False
 
-    def admit(self, sample: Sample, estimate: Estimate, demand: float) -> float:
+    def safe_voltage(self, sample: Sample, estimate: Estimate, demand: float) -> float:
         """Return the voltage to send, V.
 
         Once a check has objected with `Urgency.NOW`, or the demand was no finite number, it is 0 V for good,
@@ -216,7 +216,7 @@ class Supervisor:
             most = self._stop_from * (1.0 - gone / _RAMP_TIME_S)
         if not most > 0.0:
             return 0.0
-        return self.limits.slewed(max(-most, min(most, demand)), self._last)
+        return self.limits.limit_slew(max(-most, min(most, demand)), self._last)
 
     def _cue(self, cue: Cue, t: float) -> None:
         following = TABLE[self.phase].get(cue)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import Finite
 from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.trip_request import TripRequest, Urgency
@@ -37,7 +37,7 @@ class Host:
     def __init__(self, backend: DeviceBackend, judge: Judge, session: int) -> None:
         self.backend, self.judge, self.session = backend, judge, session
         self.objector = Objector()
-        limits = Limits(voltage=MOST, period=PERIOD, notify=self._notified)
+        limits = Limiter(voltage=MOST, period=PERIOD, notify=self._notified)
         monitors = (Finite(), self.objector)
         self.supervisor = Supervisor(monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified)
         self.sample = Sample(-math.inf, 0.0, 0.0)
@@ -60,7 +60,7 @@ class Host:
             self.judge.note(f"time goes from {self.sample.t} s to {sample.t} s")
         self.sample = sample
         self.supervisor.engages(sample)
-        voltage = self.supervisor.admit(sample, self._estimate, demand)
+        voltage = self.supervisor.safe_voltage(sample, self._estimate, demand)
         self.judge.wrote(voltage)
         self._look(voltage, demand)
         self.backend.write(voltage)
@@ -72,7 +72,7 @@ class Host:
         for urgency in Urgency:
             self.supervisor.stop(TripRequest("test", "once more", "", urgency), later.t)
         began = self.supervisor.engages(later)
-        voltage = self.supervisor.admit(later, self._estimate, demand)
+        voltage = self.supervisor.safe_voltage(later, self._estimate, demand)
         if began or voltage != 0.0 or self.supervisor.phase is not Phase.TRIPPED:
             self.judge.note(f"{voltage} V in phase {self.supervisor.phase} after a trip")
 

@@ -11,7 +11,7 @@ from hypothesis.stateful import run_state_machine_as_test
 
 from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.disarm import Disarm
-from dcmp_hil.safety.limits import Limits
+from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import Finite
 from dcmp_hil.safety.supervisor import TABLE, Cue, Phase, Supervisor
 from dcmp_hil.values import Fault
@@ -43,11 +43,11 @@ def _method(kind: type, name: str, other: Any) -> Callable[[Patch], None]:
     return lambda patch: patch.setattr(kind, name, other)
 
 
-_admit = Supervisor.admit
+_safe_voltage = Supervisor.safe_voltage
 
 
-def _admit_nan(supervisor: Supervisor, sample: Sample, estimate: Estimate, demand: float) -> float:
-    return demand if math.isnan(demand) else _admit(supervisor, sample, estimate, demand)
+def _safe_voltage_nan(supervisor: Supervisor, sample: Sample, estimate: Estimate, demand: float) -> float:
+    return demand if math.isnan(demand) else _safe_voltage(supervisor, sample, estimate, demand)
 
 
 IN_HOST = {
@@ -57,8 +57,8 @@ IN_HOST = {
     "an orderly end that never ends": _table(Phase.STOPPING, Cue.STOPPED, Phase.STOPPING),
     "an orderly end with full authority": _table(Phase.STOPPING, Cue.STOPPED, Phase.RUNNING),
     "no ramp": _method(Supervisor, "_partial_voltage", lambda _, __, demand: demand),
-    "no clamp": _method(Limits, "voltage", lambda _, __, demand, ___: demand),
-    "NaN is let through": _method(Supervisor, "admit", _admit_nan),
+    "no clamp": _method(Limiter, "limit_voltage", lambda _, __, demand, ___: demand),
+    "NaN is let through": _method(Supervisor, "safe_voltage", _safe_voltage_nan),
     "a fault of the device is not seen": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
     "no goodbye": _method(Disarm, "run", lambda *_, **__: True),
 }

@@ -46,7 +46,7 @@ class Bounds(NamedTuple):
         )
 
 
-class Governor:
+class ReferenceGovernor:
     """Keeps a reference inside bounds.
 
     Parameters

@@ -1,11 +1,11 @@
-"""Limits on reference, voltage and slew: the one that acts is named, and none may act for long."""
+"""The limiter of reference, voltage and slew: the one that acts is named, and none may act for long."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.safety.governor import Bounds, Governor
+from dcmp_hil.safety.reference_governor import Bounds, ReferenceGovernor
 from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Event, EventKind, LimitData, Reference
 
@@ -38,7 +38,7 @@ class _Lasting:
         return t - self._since >= self._allowed
 
 
-class Limits:
+class Limiter:
     """Limits of reference and voltage; a limit that acts for too long ends the run by a ramp.
 
     Parameters
@@ -87,7 +87,7 @@ class Limits:
         self._x, self._v, self._error = position, velocity, error
         self._a = min(acceleration, velocity / _SPEED_UP_TIME_MIN_S)
         bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
-        self._governor = Governor(bounds) if math.isfinite(position + velocity) else None
+        self._governor = ReferenceGovernor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
         self._stop: TripRequest | None = None
         self._slews = slew < math.inf
@@ -103,7 +103,7 @@ class Limits:
         """Begin to judge the variation of the voltage."""
         self._chatter, self._left = chatter, chatter.block
 
-    def reference(self, sample: Sample, reference: Reference) -> Reference:
+    def limit_reference(self, sample: Sample, reference: Reference) -> Reference:
         """Return the reference, or what of it is allowed; NaN stays, and trips as the demand."""
         error, most = reference.position - sample.position, self._error
         governed = self._governor.bound(sample.t, reference) if self._governor else reference
@@ -111,7 +111,7 @@ class Limits:
             return reference
         return self._judged(sample, reference, governed)
 
-    def voltage(self, t: float, demand: float, last: float) -> float:
+    def limit_voltage(self, t: float, demand: float, last: float) -> float:
         """Return the demand, V, or what of it is allowed after `last` V."""
         most = self.voltage_limit
         if not -most <= demand <= most or self._slews:
@@ -126,7 +126,7 @@ class Limits:
         """Object if a limit has acted for too long up to this period."""
         return self._stop
 
-    def slewed(self, voltage: float, last: float) -> float:
+    def limit_slew(self, voltage: float, last: float) -> float:
         """Return the voltage, or the nearest that the slew allows after `last` V."""
         return max(last - self._step, min(last + self._step, voltage))
 
@@ -170,7 +170,7 @@ class Limits:
         voltage = max(-most, min(most, demand))
         if voltage != demand:
             self._say(t, "voltage", f"voltage limited: {demand:.1f} V asked for, {most:.1f} V allowed")
-        slewed = self.slewed(voltage, last) if self._slews else voltage
+        slewed = self.limit_slew(voltage, last) if self._slews else voltage
         if slewed != voltage:
             self._say(t, "slew", f"slew limited: {voltage:.1f} V asked for after {last:.1f} V")
         if slewed != demand:
