@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.fault_injection import Faults
-    from dcmp_hil.live import Control
+    from dcmp_hil.live import CommandInterface
     from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.sink_factories import SinkMaker
     from dcmp_hil.values import EventData, Level
@@ -86,7 +86,7 @@ class Session:
         keep_columns: bool = True,
         stop: StopRequest | None = None,
         warn: Callable[[str], None] | None = None,
-        control: Control | None = None,
+        control: CommandInterface | None = None,
         faults: Iterable[object] | Faults = (),
         clear: bool = False,
     ) -> None:

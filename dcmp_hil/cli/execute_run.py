@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dcmp_hil.fault_injection import Faults
-    from dcmp_hil.live.process import ControlProcess
+    from dcmp_hil.live.command_process import CommandProcess
     from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.telemetry.sink_factories import SinkMaker
 
@@ -152,15 +152,15 @@ def _to_its_end(session: Session) -> _End:
     return _End(stop.asked_by or "duration", None, stop.exit_code)
 
 
-def _control(rig: Rig, options: Options, folder: RunFolder | None) -> ControlProcess | None:
+def _control(rig: Rig, options: Options, folder: RunFolder | None) -> CommandProcess | None:
     """Return the process through which clients control the run; None in virtual time."""
     if options.fast:
         return None
-    from dcmp_hil.live.process import ControlProcess
+    from dcmp_hil.live.command_process import CommandProcess
 
     place = folder.path.absolute() if folder else None
     unattended = Unattended(rig, place, options.json_file, options.note, options.faults)
-    return ControlProcess(listen=options.control, unattended=unattended)
+    return CommandProcess(listen=options.control, unattended=unattended)
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:

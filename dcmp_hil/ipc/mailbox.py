@@ -1,4 +1,4 @@
-"""The mailbox between control process and loop: one slot in shared memory, without a lock."""
+"""The mailbox between command process and loop: one slot in shared memory, without a lock."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.summary_sink import SummarySink
 
 
-class Control(Protocol):
+class CommandInterface(Protocol):
     """Protocol of a process through which clients change a run."""
 
     @property
@@ -40,7 +40,7 @@ class Control(Protocol):
         ...
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
-        """Start the control process, without waiting until it is ready.
+        """Start the command process, without waiting until it is ready.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class Control(Protocol):
         ring
             Descriptor of the memory of the ring of periods; None if no other process may see it.
         warn
-            Called, from any thread, if the control process no longer listens.
+            Called, from any thread, if the command process no longer listens.
         """
         ...
 
@@ -62,4 +62,4 @@ class Control(Protocol):
         ...
 
 
-__all__ = ["Control"]
+__all__ = ["CommandInterface"]

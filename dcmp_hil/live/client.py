@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _ANSWER_TIMEOUT_S = 3.0  # s: a change has a second to be applied in
-_STOP_RECEIPT_TIMEOUT_S = 0.15  # s for a control process to say that it has understood STOP
+_STOP_RECEIPT_TIMEOUT_S = 0.15  # s for a command process to say that it has understood STOP
 _NO_RUN_ERROR = (
     "No run listens here. Start one with `dcmp-hil run`; --no-control and --fast keep it from listening."
 )
@@ -67,7 +67,7 @@ def status(run: int) -> dict[str, Any]:
 def stop(run: int) -> Stopped:
     """End a run, by force where it does not answer; return within a second what became of it.
 
-    Its control process does it. Where that is silent, it is done here, by the memory that the two share.
+    Its command process does it. Where that is silent, it is done here, by the memory that the two share.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def stop_found(pid: int | None) -> tuple[int, Stopped] | DcmpError:
 
 
 def _exchange_stop(connection: socket.socket) -> Stopped:
-    """Ask the control process.
+    """Ask the command process.
 
     Raises
     ------

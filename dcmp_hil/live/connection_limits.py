@@ -1,4 +1,4 @@
-"""Bounds on who is connected to a run's control process, so that STOP gets through a crowd of connections."""
+"""Bounds on who is connected to a run's command process, so that STOP gets through a crowd of connections."""
 
 from __future__ import annotations
 

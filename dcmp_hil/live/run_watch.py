@@ -1,4 +1,4 @@
-"""The control process follows its run: whether it lives, and which signals it received."""
+"""The command process follows its run: whether it lives, and which signals it received."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Watcher:
                     await self._follow(pid)
                 self.run = None
                 if self.state["connection"] != "ended":
-                    self.state = {"connection": "ended", "ended": "its control process is gone."}
+                    self.state = {"connection": "ended", "ended": "its command process is gone."}
             await asyncio.sleep(_SEARCH_PERIOD_S)
 
     def _find(self) -> int | None:

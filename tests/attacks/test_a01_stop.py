@@ -22,7 +22,7 @@ import pytest
 
 from dcmp_hil.live import run_sockets
 from dcmp_hil.recording.reader import read_run
-from tests.live.processes import BOUND, control_of, started, until, until_running
+from tests.live.processes import BOUND, command_process_of, started, until, until_running
 from tools.stop_bars.attack import attack
 from tools.stop_bars.bars import HOSTILE, KINDS, WAYS, Bar, table
 
@@ -133,7 +133,7 @@ def test_stop_works_when_the_control_process_is_killed(tmp_path: Path) -> None:
     run_options = ("--viewer", "none", "--no-record", "--duration", "0", "--json", "figures.json")
     with started(tmp_path, "run", "bench-1khz", *run_options) as run:
         until_running(run)
-        os.kill(control_of(run.pid), signal.SIGKILL)
+        os.kill(command_process_of(run.pid), signal.SIGKILL)
         done = subprocess.run(
             [sys.executable, "-m", "dcmp_hil", "stop", "--run", str(run.pid)],
             capture_output=True,

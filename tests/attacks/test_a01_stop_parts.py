@@ -19,7 +19,7 @@ from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import stop_command
-from dcmp_hil.live.control import ControlSetup, Server
+from dcmp_hil.live.command_server import CommandSetup, Server
 from dcmp_hil.live.stop_command import End, stop_run
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
@@ -109,7 +109,7 @@ def test_state_is_silent_when_no_period_came_for_half_a_second(monkeypatch: pyte
     owner = _Owner()
     mailbox, ring = reserve(owner, "mailbox"), reserve(owner, "ring")
     rows = Ring(16, mapped(ring, size_of(16)))
-    server = Server(ControlSetup(bench(), mailbox, ring), Mailbox(mapped(mailbox, SIZE)), os.getpid())
+    server = Server(CommandSetup(bench(), mailbox, ring), Mailbox(mapped(mailbox, SIZE)), os.getpid())
     Mailbox(mapped(mailbox, SIZE)).tell_phase(4)
     rows.push(cycle(1.0, position=0.5, applied=2.0), Truth(0.0, 0.0, 0.0))
     server.look()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Here:
-    """A control process that is none: what it would do is done by the test, in this process."""
+    """A command process that is none: what it would do is done by the test, in this process."""
 
     def __init__(self) -> None:
         self.mailbox = Mailbox()

@@ -70,8 +70,8 @@ def until_running(process: subprocess.Popen[str]) -> None:
     assert process.poll() is None, process.communicate()[1]
 
 
-def control_of(pid: int) -> int:
-    """Return the control process of a run."""
+def command_process_of(pid: int) -> int:
+    """Return the command process of a run."""
     with socket.socket(socket.AF_UNIX) as connection:
         connection.connect(str(socket_of(pid)))
         return peer_of(connection)[0]

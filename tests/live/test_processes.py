@@ -1,4 +1,4 @@
-"""Real runs, changed and stopped from outside; a control process that is frozen, killed, or left behind."""
+"""Real runs, changed and stopped from outside; a command process that is frozen, killed, or left behind."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, run_sockets
 from dcmp_hil.live.stop_command import End
-from tests.live.processes import BOUND, control_of, started, until, until_running
+from tests.live.processes import BOUND, command_process_of, started, until, until_running
 
 pytestmark = pytest.mark.usefixtures("own_run_folder")
 
@@ -51,7 +51,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
         ):
             with pytest.raises(ConfigError, match=why):
                 client.change(run.pid, [refused])
-        control = control_of(run.pid)
+        commands = command_process_of(run.pid)
         stopped = client.stop(run.pid)
         assert stopped.end is End.CONFIRMED
         assert stopped.said.endswith("Amplifier at 0 V.")
@@ -62,46 +62,46 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
     assert run.returncode == 0
     assert figures["ended_by"] == "STOP"
     assert len(figures["changes"]) == 1
-    until(lambda: _gone(control), "the control process left", within=1.0)
+    until(lambda: _gone(commands), "the command process left", within=1.0)
     assert run_sockets.running() == []
 
 
 def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        control = control_of(run.pid)
-        os.kill(control, signal.SIGSTOP)
+        commands = command_process_of(run.pid)
+        os.kill(commands, signal.SIGSTOP)
         try:
             client.stop(run.pid)
             run.wait(timeout=BOUND)
         finally:
             with suppress(ProcessLookupError):
-                os.kill(control, signal.SIGCONT)
+                os.kill(commands, signal.SIGCONT)
     assert run.returncode == 0
-    assert _gone(control)
+    assert _gone(commands)
 
 
 def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        os.kill(control_of(run.pid), signal.SIGKILL)
+        os.kill(command_process_of(run.pid), signal.SIGKILL)
         until(lambda: not run_sockets.running(), "its socket was cleaned up")
         assert run.poll() is None
         run.send_signal(signal.SIGINT)
         _, err = run.communicate(timeout=BOUND)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
-    assert err.count("The control process ended") == 1
-    assert sum("The control process ended" in trouble for trouble in figures["troubles"]) == 1
+    assert err.count("The command process ended") == 1
+    assert sum("The command process ended" in trouble for trouble in figures["troubles"]) == 1
 
 
 def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
-        control = control_of(run.pid)
+        commands = command_process_of(run.pid)
         run.kill()
         run.communicate(timeout=BOUND)
-        until(lambda: _gone(control), "the control process left", within=1.0)
+        until(lambda: _gone(commands), "the command process left", within=1.0)
     assert run_sockets.running() == []
 
 
@@ -113,7 +113,7 @@ def test_run_says_why_it_does_not_listen_when_its_folder_is_not_its_own(tmp_path
         run.send_signal(signal.SIGINT)
         run.communicate(timeout=BOUND)
     assert run.returncode == 0
-    assert "The control process ended" in said
+    assert "The command process ended" in said
     assert "is no folder of yours alone" in said
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.live.processes import BOUND, control_of, own_folder, started, until, until_running
+from tests.live.processes import BOUND, command_process_of, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def test_page_finds_the_next_run_and_escape_stops_it(tmp_path: Path) -> None:
                 until_running(run)
                 until(lambda: _text(page, "process") == f"process {run.pid}", "the page found the run")
                 until(lambda: _text(page, "phase") == "running", "the page showed the phase")
-                control = control_of(run.pid)
+                control = command_process_of(run.pid)
                 os.kill(control, signal.SIGSTOP)
                 until(lambda: _text(page, "phase") == "no answer", "the page said that the run is silent")
                 assert _text(page, "voltage") == _NOT_KNOWN  # and not the voltage of before

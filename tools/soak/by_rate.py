@@ -1,7 +1,7 @@
 """A minute of simulated rows, written into the ring over and over, many times faster than real time.
 
 From there they go their usual way, through the telemetry process (figures, run.mcap, run.rrd, a dashboard
-that is served) and past the control process, which has a watcher. Where a sink is far behind, the source
+that is served) and past the command process, which has a watcher. Where a sink is far behind, the source
 waits, so that a busy computer makes a soak longer and loses nothing.
 
 Once a simulated minute the source waits until all rows are in the files, and memory is looked at then: up to
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil import load_rig
 from dcmp_hil.cli.run_sinks import recording
 from dcmp_hil.ipc.run_end import AT_ZERO
-from dcmp_hil.live.process import ControlProcess
+from dcmp_hil.live.command_process import CommandProcess
 from dcmp_hil.live.run_sockets import socket_of
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.telemetry.rerun.rig_view import view_of
@@ -73,13 +73,13 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
         Statistics(rig.period), keep=False, sinks=sorted_out(_makers(rig, folder, history, leak))[1],
         warn=troubles.append, model=rig.model.values(), speed=speed,
     )  # fmt: skip
-    control = ControlProcess()
+    commands = CommandProcess()
     source = Source(apart.ring, a_minute(rig))
     apart.open()
-    control.open(rig, apart.ring_file, troubles.append)
-    if apart.pid is None or control.pid is None:
+    commands.open(rig, apart.ring_file, troubles.append)
+    if apart.pid is None or commands.pid is None:
         raise OSError("; ".join(troubles))
-    pids = {"control side": os.getpid(), "telemetry process": apart.pid, "control process": control.pid}
+    pids = {"control side": os.getpid(), "telemetry process": apart.pid, "command process": commands.pid}
     memory, began = Memory(), time.monotonic()
     with _watching(os.getpid()):
         for batch in range(round(minutes * _BATCHES_A_MINUTE)):
@@ -99,7 +99,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
         wall = time.monotonic() - began
         cpu = {name: cpu_s(pid) for name, pid in pids.items()}
     apart.close()
-    control.close("The soak is over.", AT_ZERO)
+    commands.close("The soak is over.", AT_ZERO)
     _wait_for_end(pids["telemetry process"])
     troubles += apart.figures.troubles
     return Soaked(

@@ -9,13 +9,13 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from dcmp_hil.live import control
+from dcmp_hil.live import command_server
 from dcmp_hil.telemetry import worker
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 
 _POLL_S = 5.0
-_PROGRAMS = {worker.__name__: "telemetry process", control.__name__: "control process"}
+_PROGRAMS = {worker.__name__: "telemetry process", command_server.__name__: "command process"}
 """Module that a child of a run imports, to what it is called."""
 
 

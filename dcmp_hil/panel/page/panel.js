@@ -278,7 +278,7 @@ function drawState() {
   const sentences = {
     none: "No run yet. Start one with `dcmp-hil run`: this page finds it.",
     ended: `The run has ended: ${state.ended} The next one is found by itself.`,
-    silent: "The control process does not answer. The run goes on; STOP works all the same.",
+    silent: "The command process does not answer. The run goes on; STOP works all the same.",
     lost: "The page's server is gone: start `dcmp-hil panel` again. STOP is Ctrl-C where the run was started.",
   };
   const banner = by("banner");

@@ -1,4 +1,4 @@
-"""The control process as its run sees it: started before anything is armed, and never waited for."""
+"""The command process as its run sees it: started before anything is armed, and never waited for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.ipc.mailbox import SIZE, Mailbox
 from dcmp_hil.ipc.shared_memory import mapped, reserve
-from dcmp_hil.live.control import ControlSetup
+from dcmp_hil.live.command_server import CommandSetup
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import SIGNALS
@@ -32,12 +32,12 @@ _EXIT_TIMEOUT_S = 0.5  # s for it to leave in, at the end of a run
 _CODE = """
 import sys
 sys.path[:] = {path!r}
-from dcmp_hil.live.control import main
+from dcmp_hil.live.command_server import main
 main({line}, {setup}, {parent})
 """
 
 
-class ControlProcess:
+class CommandProcess:
     """Lets `dcmp-hil set`, `stop` and `panel` change a run, from a process that shares nothing with the loop.
 
     It sees to it that STOP and signals end the run, with any code in it.
@@ -47,7 +47,7 @@ class ControlProcess:
     listen
         Whether others may change the run.
     unattended
-        Called in the telemetry process where this process has ended by force; see `Control`.
+        Called in the telemetry process where this process has ended by force; see `CommandInterface`.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ class ControlProcess:
         self, *, listen: bool = True, unattended: Callable[[SummarySink, int, str, str], None] | None = None
     ) -> None:
         self._listen, self.unattended = listen, unattended
-        self._file, self._setup = reserve(self, "mailbox"), reserve(self, "control")
+        self._file, self._setup = reserve(self, "mailbox"), reserve(self, "command")
         self.mailbox = Mailbox(mapped(self._file, SIZE))
         self.pid: int | None = None
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._closing = False
-        self._watch = threading.Thread(target=self._wait, name="control", daemon=True)
+        self._watch = threading.Thread(target=self._wait, name="command", daemon=True)
         self._warn: Callable[[str], None]
 
     @property
@@ -81,11 +81,11 @@ class ControlProcess:
         return self._file
 
     def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
-        """Start it; it comes up by itself, in about half a second. See `Control`."""
+        """Start it; it comes up by itself, in about half a second. See `CommandInterface`."""
         if ring is None:
             return
         self._warn = warn
-        os.write(self._setup, pickle.dumps(ControlSetup(rig, self._file, ring, self._listen)))
+        os.write(self._setup, pickle.dumps(CommandSetup(rig, self._file, ring, self._listen)))
         line, theirs = socket.socketpair()
         line.setblocking(False)
         with theirs:
@@ -100,7 +100,7 @@ class ControlProcess:
                 )
             except OSError as error:
                 line.close()
-                warn(f"The control process could not be started ({error}): this run cannot be changed.")
+                warn(f"The command process could not be started ({error}): this run cannot be changed.")
                 return
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -110,7 +110,7 @@ class ControlProcess:
         self._watch.start()
 
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:
-        """Wait until it listens; not for one that has ended. See `Control`."""
+        """Wait until it listens; not for one that has ended. See `CommandInterface`."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(1e9 * _START_TIMEOUT_S)
         while self._line is not None and self._watch.is_alive() and not stopped():
@@ -139,6 +139,6 @@ class ControlProcess:
             if not self._closing:
                 why = self.mailbox.last_words or f"exit code {code}"
                 self._warn(
-                    f"The control process ended ({why}): `dcmp-hil set`, `stop` and `panel` reach this run "
+                    f"The command process ended ({why}): `dcmp-hil set`, `stop` and `panel` reach this run "
                     "no more; it goes on, and Ctrl-C ends it."
                 )

@@ -1,4 +1,4 @@
-"""The control process's server, in this process: who is answered, and with what."""
+"""The command process's server, in this process: who is answered, and with what."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
-from dcmp_hil.live import control
+from dcmp_hil.live import command_server
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 
@@ -25,14 +25,14 @@ _ROWS = 16
 
 
 class _Rig:
-    """What a run would share with its control process, and a loop that answers as it is told to."""
+    """What a run would share with its command process, and a loop that answers as it is told to."""
 
     def __init__(self) -> None:
         files = [reserve(self, "mailbox"), reserve(self, "ring")]
         self.mailbox = Mailbox(mapped(files[0], SIZE))
         self.ring = Ring(_ROWS, mapped(files[1], size_of(_ROWS)))
-        setup = control.ControlSetup(bench(), files[0], files[1])
-        self.server = control.Server(setup, Mailbox(mapped(files[0], SIZE)), os.getpid())
+        setup = command_server.CommandSetup(bench(), files[0], files[1])
+        self.server = command_server.Server(setup, Mailbox(mapped(files[0], SIZE)), os.getpid())
         self.answer: int | None = APPLIED
 
     async def ask(self, place: Path, *requests: Any) -> list[Any]:
@@ -112,7 +112,7 @@ def test_state_is_the_newest_period_in_numbers_and_words(rig: _Rig, tmp_path: Pa
 
 
 def test_another_user_is_not_answered(rig: _Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(control, "peer_of", lambda _: (1, os.getuid() + 1))
+    monkeypatch.setattr(command_server, "peer_of", lambda _: (1, os.getuid() + 1))
     assert asyncio.run(rig.ask(tmp_path / "s", {"do": "status"})) == [None]
 
 

@@ -1,4 +1,4 @@
-"""The control process: listens for this user's changes, checks them, and hands them to the loop.
+"""The command process: listens for this user's changes, checks them, and hands them to the loop.
 
 It leaves as soon as its end of the line to the run is closed, for any reason.
 """
@@ -44,7 +44,7 @@ _STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in
 
 
 @dataclass(frozen=True, slots=True)
-class ControlSetup:
+class CommandSetup:
     """Arguments of the child process.
 
     Parameters
@@ -76,7 +76,7 @@ class Server:
         Process id of the run.
     """
 
-    def __init__(self, setup: ControlSetup, mailbox: Mailbox, parent: int) -> None:
+    def __init__(self, setup: CommandSetup, mailbox: Mailbox, parent: int) -> None:
         self._rig, self._knobs = setup.rig, knobs(setup.rig)
         self._parent = parent
         self._mailbox = mailbox
@@ -246,7 +246,7 @@ def main(line: int, setup: int, parent: int) -> None:
     os.lseek(setup, 0, os.SEEK_SET)
     with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:
         connection.setblocking(False)
-        prepared: ControlSetup = pickle.load(file)  # noqa: S301 - written by our own parent
+        prepared: CommandSetup = pickle.load(file)  # noqa: S301 - written by our own parent
         mailbox = Mailbox(mapped(prepared.mailbox, SIZE))
         try:
             path = socket_of(parent) if prepared.listen else None
