@@ -14,7 +14,7 @@ from dcmp_hil.config.explain import warnings
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import SimSection
 from dcmp_hil.device.links import registry
-from dcmp_hil.device.links.factory import make_link
+from dcmp_hil.device.links.listen_only import make_listening_link
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named
 from dcmp_hil.telemetry import signals
@@ -52,8 +52,8 @@ def rig_of(kind: str, *overrides: str) -> Any:
 
 
 def test_every_kind_of_backend_has_a_factory_and_a_bench_of_the_contract_suite() -> None:
-    assert list(registry.KINDS) == SHIPPED
-    for kind, path in registry.KINDS.items():
+    assert list(registry.BACKENDS) == SHIPPED
+    for kind, path in registry.BACKENDS.items():
         assert callable(find_named(path, kind))
     benched = set()
     for name in ALL:
@@ -69,9 +69,9 @@ def test_every_carrier_of_the_board_in_this_process_is_on_a_bench() -> None:
 
 def test_every_device_on_a_wire_can_be_listened_to() -> None:
     wired = [kind for kind in SHIPPED if KINDS["backend"][kind].device and not is_simulated(kind)]  # type: ignore[attr-defined]
-    assert list(registry.LINKS) == wired
+    assert list(registry.LISTENERS) == wired
     for kind in wired:
-        link = make_link(rig_of(kind).backend, SimulatedClock())
+        link = make_listening_link(rig_of(kind).backend, SimulatedClock())
         members = ("name", "corrupt", "pending", "open", "close", "send", "receive")
         assert all(hasattr(link, member) for member in members)
 
@@ -82,7 +82,7 @@ def is_simulated(kind: str) -> bool:
 
 @pytest.mark.parametrize("kind", SHIPPED)
 def test_what_a_backend_is_agrees_with_what_its_factory_says(kind: str) -> None:
-    factory = find_named(registry.KINDS[kind], kind)
+    factory = find_named(registry.BACKENDS[kind], kind)
     assert is_simulated(kind) == getattr(factory, "simulated", False)
     assert issubclass(KINDS["backend"][kind], Device) == KINDS["backend"][kind].device  # type: ignore[attr-defined]
 

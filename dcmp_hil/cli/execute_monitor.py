@@ -11,7 +11,7 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.streams import output_failed
 from dcmp_hil.device.client import DeviceClient
 from dcmp_hil.device.discovery import state_in_words
-from dcmp_hil.device.links.factory import make_link
+from dcmp_hil.device.links.listen_only import make_listening_link
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.stop_request import StopRequest
@@ -63,7 +63,7 @@ class _Ticks:
 def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
     """Print messages for `duration` (s, 0 for ever) or until the user ends it; return the exit code."""
     clock = MonotonicClock()
-    link = make_link(rig.backend, clock)
+    link = make_listening_link(rig.backend, clock)
     caller, brief, ticks = DeviceClient(link, clock, 0), _Brief(), _Ticks()
     heard = 0
     try:

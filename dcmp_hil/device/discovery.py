@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.device.boot_history import history_of
 from dcmp_hil.device.client import DeviceClient
-from dcmp_hil.device.links.factory import make_link
+from dcmp_hil.device.links.listen_only import make_listening_link
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.safety.device_faults import name_of
@@ -175,7 +175,7 @@ def _ask(
     settings: Serial | Can, clock: Clock, wait: float, *, history: bool
 ) -> tuple[dict[int, tuple[str, str]], bool]:
     """Return the devices at the other end and their past, in words, and whether damaged frames came."""
-    link = make_link(settings, clock)
+    link = make_listening_link(settings, clock)
     try:
         link.open()
         nodes = _hear_nodes(DeviceClient(link, clock, 0), clock, wait)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.device.links.registry import KINDS
+from dcmp_hil.device.links.registry import BACKENDS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_injection import NO_FAULTS
 from dcmp_hil.platform.clock import SimulatedClock
@@ -41,12 +41,12 @@ def open_backend(rig: Rig, clock: Clock, faults: Faults = NO_FAULTS, *, clear: b
         If there is none by that name, or it is a real device and the rig or the clock is not for one.
     """
     kind = rig.backend.kind
-    if kind in KINDS:
-        ours = _allowed(find_named(KINDS[kind], BACKEND.key), rig, clock)
+    if kind in BACKENDS:
+        ours = _allowed(find_named(BACKENDS[kind], BACKEND.key), rig, clock)
         return faults.backend(
             lambda *arguments, **options: _told(ours(*arguments, **options), clear=clear), rig, clock
         )
-    own = _allowed(find_named(kind, BACKEND.key, KINDS, rig.plugin_folders), rig, clock)
+    own = _allowed(find_named(kind, BACKEND.key, BACKENDS, rig.plugin_folders), rig, clock)
 
     def checked(*arguments: Any, **options: Any) -> Backend:
         return CheckedBackend(_told(make(own, kind, BACKEND, arguments, options), clear=clear), kind)

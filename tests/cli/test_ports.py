@@ -252,7 +252,7 @@ def test_ports_and_monitor_close_what_could_not_be_opened(cli: Cli, monkeypatch:
             closed.append(self.name)
 
     for room in ("dcmp_hil.device.discovery", "dcmp_hil.cli.execute_monitor"):
-        monkeypatch.setattr(f"{room}.make_link", lambda *_: Broken())
+        monkeypatch.setattr(f"{room}.make_listening_link", lambda *_: Broken())
     assert cli("ports", "/dev/ttyX").code == 0
     assert closed
     closed.clear()

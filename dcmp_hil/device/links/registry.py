@@ -1,6 +1,6 @@
-"""The tables of backends and links: names in rig.toml to `module:factory`."""
+"""The tables of backends and listeners: names in rig.toml to `module:factory`."""
 
-KINDS = {
+BACKENDS = {
     "sim": "sim_backend.backend:SimBackend",
     "sim-board": "sim_backend.board.backend:SimBoardBackend",
     "serial": "dcmp_hil.device.links.serial:open_serial",
@@ -8,7 +8,7 @@ KINDS = {
 }
 """Backends; a factory takes (rig, clock)."""
 
-LINKS = {
+LISTENERS = {
     "serial": "dcmp_hil.device.links.serial:listen",
     "can": "dcmp_hil.device.links.can:listen",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device.links.registry import LINKS
+from dcmp_hil.device.links.registry import LISTENERS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
 
 
-def make_link(settings: Section, clock: Clock) -> Link:
+def make_listening_link(settings: Section, clock: Clock) -> Link:
     """Make the link that `[backend]` describes, not yet open; by itself it writes nothing to a serial port.
 
     Raises
@@ -23,10 +23,10 @@ def make_link(settings: Section, clock: Clock) -> Link:
         If that kind has no link that one could listen to.
     """
     kind = getattr(settings, "kind", "")
-    if kind not in LINKS:
+    if kind not in LISTENERS:
         raise ConfigError(
             f'backend.kind: got "{kind}", which has no wire to listen to. Use "serial" '
             'or "can", such as --set backend.kind=serial --set backend.port=/dev/ttyACM0.'
         )
-    link: Link = find_named(LINKS[kind], "backend.kind")(settings, clock)
+    link: Link = find_named(LISTENERS[kind], "backend.kind")(settings, clock)
     return link
