@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil.conformance.terms import CAN
 from dcmp_hil.errors import SampleTimeoutError
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
     Drive,
     FaultReport,
@@ -17,6 +16,7 @@ from dcmp_hil.wire.messages import (
     SampleReport,
     Stop,
 )
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,7 +93,7 @@ class Listener:
             return None
         self.heard.append(message)
         if isinstance(message, SampleReport):
-            self.tick = nearest(self.tick, message.tick, 8) if self.samples else message.tick
+            self.tick = unwrap(self.tick, message.tick, 8) if self.samples else message.tick
             self.samples.append(Seen(self.tick, message, self._fault))
             self._fault = None
             self._notice_lateness()
@@ -151,7 +151,7 @@ class Listener:
 
     def join(self, tick: int) -> None:
         """Continue SAMPLE's tick from the parameter TICK, which was just read."""
-        self.tick = nearest(tick, self.samples[-1].sample.tick, 8)
+        self.tick = unwrap(tick, self.samples[-1].sample.tick, 8)
         self._offset_us = None
 
     def mark(self) -> int:

@@ -16,10 +16,10 @@ from dcmp_hil.device.run_exit import another_runs, why_left
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Drive, FaultReport, Health, SampleReport, State, Stop, StopReason
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from dcmp_hil.wire.quality import judge
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -248,7 +248,7 @@ class DeviceBackend:
         """Advance device time and position; lost samples show as a larger step, late ones as nothing."""
         last = self._tick
         counts, _, raw_tick, state, _, _, _ = report
-        tick = nearest(last, raw_tick, 8)
+        tick = unwrap(last, raw_tick, 8)
         if tick <= last:
             if state == _RUN:
                 self._meter.counts.stale += 1
@@ -260,7 +260,7 @@ class DeviceBackend:
         self._tick = tick
         self._t = (tick - self._first_tick) * self._period
         if self._has_count:
-            self._count = nearest(self._count, counts, 24)
+            self._count = unwrap(self._count, counts, 24)
         else:
             self._start_counting(counts)
         return report
@@ -268,8 +268,8 @@ class DeviceBackend:
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
         zero = self._terms.zero
-        self._zero = nearest(0, self._hanging, 24) if zero is None else zero
-        self._count = nearest(self._zero, raw, 24)  # near the counter's wrap it matters
+        self._zero = unwrap(0, self._hanging, 24) if zero is None else zero
+        self._count = unwrap(self._zero, raw, 24)  # near the counter's wrap it matters
 
     def _fault_in(self, report: SampleReport, last: int) -> int:
         """Return the fault of a device that is not in RUN; `last` is the tick at which it was."""

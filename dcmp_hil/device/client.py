@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
     FaultReport,
     Health,
@@ -16,6 +15,7 @@ from dcmp_hil.wire.messages import (
     ParameterValue,
     SampleReport,
 )
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -196,7 +196,7 @@ class DeviceClient:
     def _note(self, message: Message) -> None:
         """Store tick, fault or health from a message, and note which request it answers."""
         if isinstance(message, SampleReport):
-            self.sample, self.tick = message, nearest(self.tick, message.tick, 8)
+            self.sample, self.tick = message, unwrap(self.tick, message.tick, 8)
             self.ticks.add(message)
         elif isinstance(message, FaultReport):
             self.fault, self.fault_detail = message.code, message.detail

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
-from dcmp_hil.wire.counters import nearest
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.messages import SampleReport
@@ -29,7 +29,7 @@ class TickWatch:
         """Add the next SAMPLE of the node."""
         last, self._last = self._last, sample
         if last is not None:
-            step = nearest(0, sample.tick - last.tick, 8)
+            step = unwrap(0, sample.tick - last.tick, 8)
             self._odd.append(step < 0 or (step == 0 and sample != last))
 
     @property

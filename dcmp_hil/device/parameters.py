@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from dcmp_hil.device import open_errors
 from dcmp_hil.device.client import PATIENCE
 from dcmp_hil.device.compatibility import COMPARED, is_possible
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, ParameterValue, Result
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -108,7 +108,7 @@ class DeviceParameters:
             sample = self._caller.hear_sample(PATIENCE)
             if sample is None:
                 raise open_errors.no_samples(self._name, PATIENCE, "nothing")
-            counts.append(nearest(counts[0] if counts else 0, sample.position_counts, 24))
+            counts.append(unwrap(counts[0] if counts else 0, sample.position_counts, 24))
         return sorted(counts)[_COUNT_READINGS // 2] % _COUNTS
 
     def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.codec import CorruptFrameError, unpack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import SampleReport, State
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link
@@ -43,7 +43,7 @@ def another_runs(link: Link, clock: Clock, node: int, ticks: tuple[int, int], pe
         s.
     """
     last, strange = ticks
-    step = nearest(0, strange - last, 8)
+    step = unwrap(0, strange - last, 8)
     first = step if 1 <= step <= _TICK_DISTANCE_MAX else 1  # that of one device comes after all of its own
     until_ns = clock.now_ns() + int(1e9 * _LISTENING_PERIODS * period)
     while (left_ns := until_ns - clock.now_ns()) > 0:
@@ -53,5 +53,5 @@ def another_runs(link: Link, clock: Clock, node: int, ticks: tuple[int, int], pe
         except CorruptFrameError:
             continue
         if isinstance(message, SampleReport) and message.state == State.RUN:
-            return first <= nearest(0, message.tick - last, 8) <= _TICK_DISTANCE_MAX + _LISTENING_PERIODS
+            return first <= unwrap(0, message.tick - last, 8) <= _TICK_DISTANCE_MAX + _LISTENING_PERIODS
     return False

@@ -10,12 +10,12 @@ import pytest
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
     Hello,
     ParameterGet,
 )
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+from dcmp_hil.wire.wrapping import unwrap
 from sim_backend.backend import SimBackend
 from sim_backend.board.board import Board
 from tests.helpers import bench
@@ -39,7 +39,7 @@ def on_the_board(host: Host, periods: int, mV_per_V: int = 1000, rad: float = ma
     sample = None
     for k in range(first, first + periods):
         if sample is not None:
-            count = nearest(count, sample.position_counts, 24)
+            count = unwrap(count, sample.position_counts, 24)
         position = rad * count
         if sample is not None:
             seen.append((position, sample.voltage_mV / mV_per_V, host.board.truth()))

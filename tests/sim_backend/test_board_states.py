@@ -10,7 +10,6 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import unpack
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import (
     FaultReport,
     Health,
@@ -18,6 +17,7 @@ from dcmp_hil.wire.messages import (
     State,
     Stop,
 )
+from dcmp_hil.wire.wrapping import unwrap
 from sim_backend.board.board import Board
 from sim_backend.board.config import board_config
 from tests.helpers import bench
@@ -47,7 +47,7 @@ def test_counters_that_wrap_change_nothing(of_board: dict[str, int]) -> None:
     host.drive(3000)
     sample = host.tick()
     assert host.board.state == State.RUN
-    turned = nearest(0, sample.position_counts - offset, 24)
+    turned = unwrap(0, sample.position_counts - offset, 24)
     assert turned == round(host.board.truth().position * 4096 / math.tau)
     assert turned > 10
 

@@ -10,8 +10,8 @@ from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.running import PUSH_MV, lower
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
-from dcmp_hil.wire.counters import nearest
 from dcmp_hil.wire.messages import FaultReport, Parameter, State
+from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,7 +38,7 @@ def _first_too_fast(client: Client, seen: Sequence[Seen], limit: int) -> int | N
         raise NotJudgedError("a SAMPLE was lost")
     counts: list[int] = []
     for one in seen:
-        counts.append(nearest(counts[-1] if counts else 0, one.sample.position_counts, 24))
+        counts.append(unwrap(counts[-1] if counts else 0, one.sample.position_counts, 24))
     periods = client.periods(_WINDOW_MS)
     for end in range(periods + 2, len(counts)):
         moved = statistics.median(counts[end - k] - counts[end - k - periods] for k in range(3))

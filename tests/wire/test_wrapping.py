@@ -3,13 +3,13 @@
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dcmp_hil.wire.counters import nearest
+from dcmp_hil.wire.wrapping import unwrap
 
 
 def test_every_step_of_a_byte() -> None:
     for value in range(-600, 600):
         for step in range(-128, 128):
-            assert nearest(value, (value + step) & 0xFF, 8) == value + step
+            assert unwrap(value, (value + step) & 0xFF, 8) == value + step
 
 
 def test_whole_turns_either_way() -> None:
@@ -18,7 +18,7 @@ def test_whole_turns_either_way() -> None:
             held = true = 0
             for _ in range(3000):
                 true += step
-                held = nearest(held, true % (1 << bits), bits)
+                held = unwrap(held, true % (1 << bits), bits)
                 assert held == true
 
 
@@ -26,7 +26,7 @@ def test_whole_turns_either_way() -> None:
 @given(st.integers(-(1 << 40), 1 << 40), st.integers(1, 32), st.data())
 def test_the_nearest_number_with_these_bits(value: int, bits: int, data: st.DataObject) -> None:
     raw = data.draw(st.integers(0, (1 << bits) - 1))
-    found = nearest(value, raw, bits)
+    found = unwrap(value, raw, bits)
     assert found % (1 << bits) == raw
     assert -(1 << bits) <= 2 * (found - value) < 1 << bits
 
@@ -38,4 +38,4 @@ def test_the_nearest_number_with_these_bits(value: int, bits: int, data: st.Data
 @example(-1)
 def test_the_first_is_twos_complement(count: int) -> None:
     raw = int.from_bytes(count.to_bytes(3, "little", signed=True), "little")
-    assert nearest(0, raw, 24) == count
+    assert unwrap(0, raw, 24) == count

@@ -1,7 +1,7 @@
 """Counters that wrap: differences and continuation."""
 
 
-def nearest(value: int, raw: int, bits: int) -> int:
+def unwrap(value: int, raw: int, bits: int) -> int:
     """Return the number closest to `value` whose lowest bits are `raw`.
 
     Parameters
