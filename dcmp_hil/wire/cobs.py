@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from binascii import crc_hqx
 from struct import Struct
 from typing import TYPE_CHECKING
+
+from dcmp_hil.wire.crc import CRC16_START, crc16
 
 if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
 
 _FRAME_BYTES_MIN, _FRAME_BYTES_MAX = 6, 13  # bytes of an encoded frame, without its delimiter
 _IDENTIFIER_MAX = 0x7FF
-_ID_CRC = [crc_hqx(number.to_bytes(2, "little"), 0xFFFF) for number in range(_IDENTIFIER_MAX + 1)]
+_ID_CRC = [crc16(number.to_bytes(2, "little"), CRC16_START) for number in range(_IDENTIFIER_MAX + 1)]
 """CRC-16/IBM-3740 of every identifier: where that of its payload goes on."""
 _two_bytes = Struct("<H").pack
 _DISTANCE = [bytes((length + 1,)) for length in range(_FRAME_BYTES_MAX)]
@@ -31,7 +32,7 @@ def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame, its delimiter included."""
     number, data = frame
     stuffed, begun = _BEGINNING[number]
-    for part in (begun + data + _two_bytes(crc_hqx(data, _ID_CRC[number]))).split(b"\0"):
+    for part in (begun + data + _two_bytes(crc16(data, _ID_CRC[number]))).split(b"\0"):
         stuffed += _DISTANCE[len(part)] + part  # every zero becomes the distance to the next
     return stuffed + b"\0"
 
@@ -82,6 +83,6 @@ def _decode(chunk: bytes) -> Frame | None:
     if place != length:
         return None
     number, data, check = _take_apart[length](body)
-    if number > _IDENTIFIER_MAX or crc_hqx(data, _ID_CRC[number]) != check:
+    if number > _IDENTIFIER_MAX or crc16(data, _ID_CRC[number]) != check:
         return None
     return number, data

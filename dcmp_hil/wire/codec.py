@@ -5,10 +5,9 @@ from __future__ import annotations
 from struct import Struct, error
 from typing import TYPE_CHECKING, Any
 
-from fastcrc import crc8
-
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.wire import messages
+from dcmp_hil.wire.crc import crc8
 from dcmp_hil.wire.messages import Drive, Edge, Identity, SampleReport
 
 if TYPE_CHECKING:
@@ -22,7 +21,6 @@ class CorruptFrameError(ValueError):
     """A frame of ours whose crc8 is wrong."""
 
 
-_crc = crc8.autosar
 _COUNTS = 0xFFFFFF  # 24 bits
 _ARM, _CLEAR, _RELEASE = 1, 2, 4
 _STATUS = [(byte & 7, byte & 8 != 0, byte & 16 != 0, byte >> 5) for byte in range(256)]
@@ -110,7 +108,7 @@ _TABLE: dict[int, tuple[Any, Callable[[Any], bytes], Callable[[bytes], Any], int
     10: (messages.ParameterValue, *_plain(messages.ParameterValue, "<BiB")),
     11: (messages.Health, *_plain(messages.Health, "<6B")),
 }
-_ID_CRC = [_crc(number.to_bytes(2, "little")) for number in range(0x800)]
+_ID_CRC = [crc8(number.to_bytes(2, "little")) for number in range(0x800)]
 """crc8 of every identifier: where that of its payload goes on."""
 _RIGHT = 0xBD  # what crc8 over a whole message and its own crc8 comes to
 _BYTE = [bytes((value,)) for value in range(256)]
@@ -133,7 +131,7 @@ def pack(message: Message, node: int = 0) -> Frame:
         body = to_bytes(message)
     except error as cause:
         raise ValueError(f"{type(message).__name__}: {_misfit(message, to_bytes)}") from cause
-    return number, body + _BYTE[_crc(body, _ID_CRC[number])]
+    return number, body + _BYTE[crc8(body, _ID_CRC[number])]
 
 
 def _misfit(message: Any, to_bytes: Callable[[Any], bytes]) -> str:
@@ -167,7 +165,7 @@ def unpack(frame: Frame, node: int = 0) -> Message | None:
     length, from_bytes = _UNPACK.get(number >> 4, _UNKNOWN)
     if from_bytes is None or len(data) != length or number & 0xF != node:
         return None
-    if _crc(data, _ID_CRC[number]) != _RIGHT:
+    if crc8(data, _ID_CRC[number]) != _RIGHT:
         raise CorruptFrameError(f"frame {number:03X}#{data.hex().upper()}: its crc8 is wrong")
     message: Message = from_bytes(data)
     return message
