@@ -7,7 +7,7 @@ import os
 import struct
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.recording.records import HEAD, MAGIC, Op, RecordError, attachment_in
+from dcmp_hil.recording.mcap_records import HEAD, MAGIC, Op, RecordError, attachment_in
 from dcmp_hil.recording.schema import END
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.recording.records import HEAD, KNOWN, Op, RecordError, channel_in, schema_in
+from dcmp_hil.recording.mcap_records import HEAD, KNOWN, Op, RecordError, channel_in, schema_in
 from dcmp_hil.recording.schema import CYCLE_SCHEMA, CYCLES, EVENTS
 
 if TYPE_CHECKING:

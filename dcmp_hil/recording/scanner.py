@@ -11,7 +11,7 @@ import struct
 import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.recording.records import (
+from dcmp_hil.recording.mcap_records import (
     HEAD,
     KNOWN,
     MAGIC,

@@ -14,8 +14,8 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.chunk_indices import ChunkIndices
+from dcmp_hil.recording.mcap_records import MAGIC
 from dcmp_hil.recording.messages import log_times
-from dcmp_hil.recording.records import MAGIC
 from dcmp_hil.recording.schema import (
     ABOUT,
     CYCLE_SCHEMA,
