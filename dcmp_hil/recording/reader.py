@@ -15,9 +15,9 @@ from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.format_1 import event_of_format_1
 from dcmp_hil.recording.mcap_records import Op, RecordError, counts_in, metadata_in
+from dcmp_hil.recording.mcap_scanner import Damage, Scanner, attachment_of
 from dcmp_hil.recording.messages import Messages
 from dcmp_hil.recording.order import Gap, in_order
-from dcmp_hil.recording.scanner import Damage, Scanner, attachment_of
 from dcmp_hil.recording.schema import ABOUT, CYCLES, END, EVENTS, FORMAT, FORMAT_1, RIG, RUN, event_from
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.signals import columns
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.recording.scanner import Record
+    from dcmp_hil.recording.mcap_scanner import Record
     from dcmp_hil.values import Event
 
 _MOST_TOLD = 20  # sentences
