@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dcmp_hil.platform.clock import pause
-from dcmp_hil.recording.end_check import ending_of
+from dcmp_hil.recording.completeness import ending_of
 
 if TYPE_CHECKING:
     from pathlib import Path
