@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import console, streams
-from dcmp_hil.cli.status import StatusLine
+from dcmp_hil.cli.status_line import StatusLine
 from dcmp_hil.platform import process_log
 
 if TYPE_CHECKING:

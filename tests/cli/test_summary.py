@@ -7,7 +7,7 @@ from dataclasses import replace
 from rich.console import Console
 
 from dcmp_hil import run
-from dcmp_hil.cli.status import StatusLine
+from dcmp_hil.cli.status_line import StatusLine
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.platform.realtime import Grant
 from dcmp_hil.telemetry.statistics import Histogram

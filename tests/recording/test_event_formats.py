@@ -16,7 +16,7 @@ from rich.console import Console
 import dcmp_hil
 import sim_backend
 from dcmp_hil import load_rig
-from dcmp_hil.cli.status import StatusLine
+from dcmp_hil.cli.status_line import StatusLine
 from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.format_1 import event_of_format_1
 from dcmp_hil.recording.metadata import about, rig_json
@@ -132,7 +132,7 @@ def test_phase_of_the_status_line_is_no_sentence() -> None:
 
 def test_no_program_reads_a_sentence() -> None:
     """Sentences go to people and to files for them; no program compares or parses them."""
-    shown = {"frames.py", "summary_sink.py", "status.py", "schema.py", "telemetry_process.py"}
+    shown = {"frames.py", "summary_sink.py", "status_line.py", "schema.py", "telemetry_process.py"}
     for package in (dcmp_hil, sim_backend):
         for path in Path(package.__path__[0]).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text("utf-8"))):
