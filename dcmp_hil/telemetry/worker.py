@@ -25,7 +25,7 @@ from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.heap import trim
 from dcmp_hil.telemetry.dispatcher import INTERVAL, DispatchThread, SinkDispatcher
-from dcmp_hil.telemetry.process_exit import how_it_died
+from dcmp_hil.telemetry.parent_exit import how_it_died
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
 from dcmp_hil.values import Event, EventKind

@@ -24,7 +24,7 @@ from dcmp_hil.live.stop_command import End, stop_run
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import Interrupted, StopRequest
-from dcmp_hil.telemetry.process_exit import how_it_died
+from dcmp_hil.telemetry.parent_exit import how_it_died
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 from tests.live.here import ChangedRun
