@@ -14,12 +14,12 @@ from dcmp_hil.cli.check import check
 from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
+from dcmp_hil.cli.forced_exit import leave
 from dcmp_hil.cli.live import set_keys, status, stop, tell_stopped
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.panel import panel
 from dcmp_hil.cli.paper import paper
 from dcmp_hil.cli.ports import ports
-from dcmp_hil.cli.process_exit import leave
 from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run

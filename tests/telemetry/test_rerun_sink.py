@@ -266,7 +266,7 @@ _DISK_FULL = """
 import resource, sys
 from contextlib import suppress
 from pathlib import Path
-from dcmp_hil.cli.process_exit import leave
+from dcmp_hil.cli.forced_exit import leave
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW, feed
 sink = RerunSink(VIEW, Path(sys.argv[1]), "none")
