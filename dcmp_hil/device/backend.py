@@ -12,7 +12,7 @@ from dcmp_hil.device.device_config import DeviceConfig
 from dcmp_hil.device.disarm import DeviceEnd, Disarm
 from dcmp_hil.device.handshake import Handshake
 from dcmp_hil.device.link_statistics import LinkMeter
-from dcmp_hil.device.run_exit import another_runs, why_left
+from dcmp_hil.device.run_state_exit import another_runs, why_left
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
