@@ -25,7 +25,7 @@ from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.reexecute import run_again
 from dcmp_hil.recording.schema import event_from, event_to_bytes
 from dcmp_hil.recording.writer import Recording
-from dcmp_hil.telemetry.rerun.frames import Frames
+from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.parameter_table import Parameters
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.values import (
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.telemetry.rerun.frames import Call
+    from dcmp_hil.telemetry.rerun.entity_columns import Call
     from dcmp_hil.values import EventData
 
 OLD = Path(__file__).with_name("data") / "format_1.mcap"  # 200 Hz, four changes, lowered at the end
@@ -132,7 +132,7 @@ def test_phase_of_the_status_line_is_no_sentence() -> None:
 
 def test_no_program_reads_a_sentence() -> None:
     """Sentences go to people and to files for them; no program compares or parses them."""
-    shown = {"frames.py", "summary_sink.py", "status_line.py", "schema.py", "telemetry_process.py"}
+    shown = {"entity_columns.py", "summary_sink.py", "status_line.py", "schema.py", "telemetry_process.py"}
     for package in (dcmp_hil, sim_backend):
         for path in Path(package.__path__[0]).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text("utf-8"))):

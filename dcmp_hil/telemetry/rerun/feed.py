@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.rerun.frames import Frames
+from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.scene import log_style
 from dcmp_hil.values import EventKind
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     import rerun as rr
 
-    from dcmp_hil.telemetry.rerun.frames import Call
+    from dcmp_hil.telemetry.rerun.entity_columns import Call
     from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
     from dcmp_hil.telemetry.signals import Signal

@@ -10,8 +10,8 @@ import rerun as rr
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
+from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.feed import send
-from dcmp_hil.telemetry.rerun.frames import Frames
 from dcmp_hil.telemetry.rerun.scene import log_scenery
 from dcmp_hil.values import Event, EventKind
 
