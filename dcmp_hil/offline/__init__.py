@@ -9,10 +9,10 @@ from dcmp_hil.offline.export import columns, write_csv, write_rrd
 from dcmp_hil.offline.figures import Estimates, Figures
 from dcmp_hil.offline.reading import read_recording
 from dcmp_hil.offline.recording import ColumnOptions, Recording
-from dcmp_hil.offline.reference import ZeroPhase, zero_phase
 from dcmp_hil.offline.resolution import estimate_counts_per_rev
 from dcmp_hil.offline.run import ReplayResult, replay
 from dcmp_hil.offline.settings import ReplaySettings
+from dcmp_hil.offline.zero_phase import ZeroPhase, zero_phase
 
 __all__ = [
     "ColumnOptions",

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.offline.recording import Recording
-    from dcmp_hil.offline.reference import ZeroPhase
+    from dcmp_hil.offline.zero_phase import ZeroPhase
 
 _ROUNDING_RAD_S2 = 1e-12  # rad/s2: what rounding leaves of a constant
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.offline.figures import Estimates
     from dcmp_hil.offline.recording import Recording
-    from dcmp_hil.offline.reference import ZeroPhase
+    from dcmp_hil.offline.zero_phase import ZeroPhase
 
 _SPEED_MAX_RAD_S = 2000.0  # rad/s, 19,000 rpm
 _ERROR_RATIO_MAX = 3.0  # times the motion itself: no observer that follows it is so far off

@@ -12,8 +12,8 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.figures import Estimates, Figures, judge, sampling
 from dcmp_hil.offline.plausibility import check_assumed, check_estimates, check_motion
 from dcmp_hil.offline.preparation import prepare
-from dcmp_hil.offline.reference import ZeroPhase, zero_phase
 from dcmp_hil.offline.settings import ReplaySettings
+from dcmp_hil.offline.zero_phase import ZeroPhase, zero_phase
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.values import Estimate, Sample
 
