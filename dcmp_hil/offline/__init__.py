@@ -5,8 +5,8 @@ result = replay(recording, ReplaySettings(inertia=0.16))
 result.figures.velocity_error_rms_rad_s
 """
 
+from dcmp_hil.offline.error_metrics import Estimates, Figures
 from dcmp_hil.offline.export import columns, write_csv, write_rrd
-from dcmp_hil.offline.figures import Estimates, Figures
 from dcmp_hil.offline.reading import read_recording
 from dcmp_hil.offline.recording import ColumnOptions, Recording
 from dcmp_hil.offline.resolution import estimate_counts_per_rev

@@ -11,7 +11,7 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.offline.figures import Estimates
+    from dcmp_hil.offline.error_metrics import Estimates
     from dcmp_hil.offline.recording import Recording
     from dcmp_hil.offline.zero_phase import ZeroPhase
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.offline.figures import Estimates, Figures, judge, sampling
+from dcmp_hil.offline.error_metrics import Estimates, Figures, judge, sampling
 from dcmp_hil.offline.plausibility import check_assumed, check_estimates, check_motion
 from dcmp_hil.offline.preparation import prepare
 from dcmp_hil.offline.settings import ReplaySettings
