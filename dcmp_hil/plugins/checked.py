@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import DcmpError
 from dcmp_hil.platform.stop_request import Interrupted
+from dcmp_hil.plugins.error_text import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
 from dcmp_hil.plugins.numbers import plain_number
-from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
 from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Estimate, Sample
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Self
 
 from dcmp_hil.errors import BackendError, DcmpError
+from dcmp_hil.plugins.error_text import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
 from dcmp_hil.plugins.numbers import plain_number, whole_number
-from dcmp_hil.plugins.words import REMEDY, at, file_of, message_of, place_of, place_of_code, shown_value
 from dcmp_hil.values import Fault, Sample, Truth
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.plugins.words import shown_path
+from dcmp_hil.plugins.error_text import shown_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
