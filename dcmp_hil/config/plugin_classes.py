@@ -8,7 +8,7 @@ from dcmp_hil.config.backends import CustomBackend
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins.roles import BACKEND, CONTROLLER, OBSERVER
-from dcmp_hil.plugins.source import look_at
+from dcmp_hil.plugins.static_check import look_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named, make_named
 from dcmp_hil.plugins.roles import BACKEND, CONTROLLER, OBSERVER, Role
-from dcmp_hil.plugins.source import look_at
+from dcmp_hil.plugins.static_check import look_at
 from tests.plugins.observer_text import OBSERVER_TEXT
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import find_named
 from dcmp_hil.plugins.roles import OBSERVER
-from dcmp_hil.plugins.source import look_at
+from dcmp_hil.plugins.static_check import look_at
 from dcmp_hil.values import Sample
 from tests.plugins.observer_text import OBSERVER_TEXT
 
