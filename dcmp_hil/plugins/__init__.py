@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.plugins.error_text import file_of, message_of, place_of, place_of_code, shown_folder, syntax_of
-from dcmp_hil.plugins.files import Place, load, locate
+from dcmp_hil.plugins.module_search import Place, load, locate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins import needs, no_such_class, not_found, split_named
 from dcmp_hil.plugins.error_text import shown_path, syntax_of
-from dcmp_hil.plugins.files import locate
+from dcmp_hil.plugins.module_search import locate
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
