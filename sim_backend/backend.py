@@ -9,16 +9,16 @@ from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import make_encoder
-from sim_backend.injection import HEALTHY
 from sim_backend.pacer import Pacer
 from sim_backend.plant import make_plant
+from sim_backend.plant_fault_hooks import HEALTHY
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     from dcmp_hil.config import Rig
     from dcmp_hil.platform.clock import Clock
-    from sim_backend.injection import PlantFaults
+    from sim_backend.plant_fault_hooks import PlantFaults
 
 
 class SimBackend:

@@ -12,7 +12,7 @@ from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
-    from sim_backend.injection import PlantFaults
+    from sim_backend.plant_fault_hooks import PlantFaults
 
 _WORD = 0xFFFF_FFFF
 
