@@ -14,7 +14,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
-from dcmp_hil.fault_injection import NO_FAULTS
+from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.live.changes import LiveChanges, NoChanges
 from dcmp_hil.loop import Line
 from dcmp_hil.plugins import make_named
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.fault_injection import Faults
+    from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest

@@ -12,7 +12,7 @@ from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
 from dcmp_hil.control.trajectory import LOWERING
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
-from dcmp_hil.fault_injection import inject
+from dcmp_hil.fault_hooks import inject
 from dcmp_hil.ipc.run_end import ZERO, end_after
 from dcmp_hil.live.changes import LiveChanges
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.fault_injection import Faults
+    from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.live import CommandInterface
     from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.sink_factories import SinkMaker

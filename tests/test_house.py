@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _ROOT = Path(__file__).parents[1]
-_RUN = {"__init__", "__main__", "api", "assembly", "fault_injection", "loop", "result", "session"}
+_RUN = {"__init__", "__main__", "api", "assembly", "fault_hooks", "loop", "result", "session"}
 _SHARED_WORDS = {"backend", "errors", "trip_request", "values"}
 _TWICE = {"Fault", "Histogram", "Hold", "Noise", "Receiver", "Recording", "Result", "Stop"}  # to become fewer
 _MODULE_LINES_MAX, _MODULE_LINES_MEDIAN, _FUNCTION_LINES_P95 = 300, 110, 25

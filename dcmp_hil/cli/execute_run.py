@@ -23,7 +23,7 @@ from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import DcmpError, IncompleteError, TripError
-from dcmp_hil.fault_injection import inject, needs_wire
+from dcmp_hil.fault_hooks import inject, needs_wire
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.disk_space import room_for
 from dcmp_hil.platform.stop_request import StopRequest
@@ -35,7 +35,7 @@ from dcmp_hil.telemetry.rerun import viewer as window
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.fault_injection import Faults
+    from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.live.command_process import CommandProcess
     from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.telemetry.sink_factories import SinkMaker

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.device.links.registry import BACKENDS
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.fault_injection import NO_FAULTS
+from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked_backend import CheckedBackend
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig
-    from dcmp_hil.fault_injection import Faults
+    from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.platform.clock import Clock
 
 
