@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.safety.polarity_check import MotorGain
     from dcmp_hil.telemetry.statistics import Summary
     from dcmp_hil.values import Event
-    from dcmp_hil.wire.quality import Concern, LinkCounters
+    from dcmp_hil.wire.link_diagnosis import Concern, LinkCounters
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from dcmp_hil.wire.quality import DeviceCounters
+from dcmp_hil.wire.link_diagnosis import DeviceCounters
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig

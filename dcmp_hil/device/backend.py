@@ -16,9 +16,9 @@ from dcmp_hil.device.run_state_exit import another_runs, why_left
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
+from dcmp_hil.wire.link_diagnosis import judge
 from dcmp_hil.wire.messages import Drive, FaultReport, Health, SampleReport, State, Stop, StopReason
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from dcmp_hil.wire.quality import judge
 from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
-    from dcmp_hil.wire.quality import Concern, LinkCounters
+    from dcmp_hil.wire.link_diagnosis import Concern, LinkCounters
 
 _SEQUENCE_MASK = 0x1FFF
 _RUN = int(State.RUN)

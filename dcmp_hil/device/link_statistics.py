@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dcmp_hil.device.clock_ratio import ClockRatio
-from dcmp_hil.wire.quality import LinkCounters, growth
+from dcmp_hil.wire.link_diagnosis import LinkCounters, growth
 
 if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link

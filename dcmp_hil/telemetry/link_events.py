@@ -10,7 +10,7 @@ from dcmp_hil.values import CauseData, Event, EventKind, LinkData
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from dcmp_hil.wire.quality import Concern, LinkCounters
+    from dcmp_hil.wire.link_diagnosis import Concern, LinkCounters
 
 HOST = ("lost", "stale", "skipped", "corrupt", "missed", "limited", "late")
 """Counters of the host's side, in the order in which they are told."""

@@ -16,8 +16,8 @@ from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns
 from dcmp_hil.values import Event, EventKind, LinkData
+from dcmp_hil.wire.link_diagnosis import LinkCounters
 from dcmp_hil.wire.messages import Health
-from dcmp_hil.wire.quality import LinkCounters
 from tests.telemetry.runs import blocks
 
 

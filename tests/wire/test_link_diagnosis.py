@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dcmp_hil.wire.quality import DeviceCounters, LinkCounters, growth, judge
+from dcmp_hil.wire.link_diagnosis import DeviceCounters, LinkCounters, growth, judge
 
 HALF_A_PERCENT = 0.005
 
