@@ -13,11 +13,11 @@ from pydantic import ValidationError
 from dcmp_hil.common.printable_text import readable
 from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.recording.deduplication import Gap, in_order
 from dcmp_hil.recording.format_1 import event_of_format_1
 from dcmp_hil.recording.mcap_records import Op, RecordError, counts_in, metadata_in
 from dcmp_hil.recording.mcap_scanner import Damage, Scanner, attachment_of
 from dcmp_hil.recording.messages import Messages
-from dcmp_hil.recording.order import Gap, in_order
 from dcmp_hil.recording.schema import ABOUT, CYCLES, END, EVENTS, FORMAT, FORMAT_1, RIG, RUN, event_from
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.signals import columns
