@@ -16,9 +16,9 @@ from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
 from dcmp_hil.recording.compare import compare
-from dcmp_hil.recording.foreign import named_in
 from dcmp_hil.recording.reader import read_run, recording_in
 from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.untrusted import named_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
