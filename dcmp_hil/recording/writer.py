@@ -12,7 +12,6 @@ from mcap.writer import CompressionType, Writer
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import utc_now
-from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.chunk_indices import ChunkIndices
 from dcmp_hil.recording.mcap_records import MAGIC
 from dcmp_hil.recording.messages import log_times
@@ -30,13 +29,14 @@ from dcmp_hil.recording.schema import (
     event_to_bytes,
     to_bytes,
 )
+from dcmp_hil.recording.write_buffer import Backlog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
     from typing import IO
 
-    from dcmp_hil.recording.backlog import Piece
+    from dcmp_hil.recording.write_buffer import Piece
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 

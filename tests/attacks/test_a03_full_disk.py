@@ -19,10 +19,10 @@ import pytest
 
 from dcmp_hil.cli.recording_check import kept_in, space_warning
 from dcmp_hil.errors import IncompleteError
-from dcmp_hil.recording.backlog import Backlog
 from dcmp_hil.recording.completeness import ending_of
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
+from dcmp_hil.recording.write_buffer import Backlog
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench
 from tests.namespaces import on_disk_of
