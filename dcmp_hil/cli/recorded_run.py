@@ -17,7 +17,7 @@ from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
 from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.reader import read_run, recording_in
-from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.untrusted import named_in
 
 if TYPE_CHECKING:
@@ -88,14 +88,14 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
         raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
-    again = run_again(run, _changed(run.rig, keys, trust=trust), trust=trust)
+    again = reexecute(run, _changed(run.rig, keys, trust=trust), trust=trust)
     result = compare(run, again, start)
     lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
     figures = {"identical": result.identical, "rows": result.rows, **lines}
     written, faults = write_each(
         [
-            (outputs.csv, partial(export.again_to_csv, run, again)),
-            (outputs.rrd, partial(export.again_to_rrd, run, again)),
+            (outputs.csv, partial(export.reexecution_to_csv, run, again)),
+            (outputs.rrd, partial(export.reexecution_to_rrd, run, again)),
             (json_file, lambda path: console.write_json(str(path), figures)),
         ]
     )

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.recording.reexecute import Again
+    from dcmp_hil.recording.reexecute import Reexecution
 
     Column = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Comparison(NamedTuple):
     figures: tuple[ComparisonLine, ...]
 
 
-def compare(recorded: RecordedRun, again: Again, start: float = 0.0) -> Comparison:
+def compare(recorded: RecordedRun, again: Reexecution, start: float = 0.0) -> Comparison:
     """Compare what observer and controller said then and now.
 
     Parameters

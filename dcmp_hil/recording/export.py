@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.recording.reexecute import Again
+    from dcmp_hil.recording.reexecute import Reexecution
 
 _ROW_GROUP = 1 << 16  # rows of a row group
 _REPLAYED_COLUMNS = (  # what a replay says a second time
@@ -69,7 +69,7 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
         sink.close()
 
 
-def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
+def reexecution_to_csv(run: RecordedRun, again: Reexecution, path: Path) -> None:
     """Write what observer and controller said then and now, one row a cycle."""
     wanted = ("time_s", *_REPLAYED_COLUMNS)
     now = tuple(_now(again).values())
@@ -83,7 +83,7 @@ def again_to_csv(run: RecordedRun, again: Again, path: Path) -> None:
             first = end
 
 
-def again_to_rrd(run: RecordedRun, again: Again, path: Path) -> None:
+def reexecution_to_rrd(run: RecordedRun, again: Reexecution, path: Path) -> None:
     """Write what observer and controller said then and now as a Rerun recording, one plot a signal."""
     from dcmp_hil.telemetry.rerun.series import write_series
 
@@ -100,7 +100,7 @@ def _write_rows(writer: Any, table: Iterable[NDArray[np.float64]]) -> None:
         writer.writerow("" if value != value else repr(value) for value in row)
 
 
-def _now(again: Again) -> dict[str, NDArray[np.float64]]:
+def _now(again: Reexecution) -> dict[str, NDArray[np.float64]]:
     return dict(zip(_REPLAYED_COLUMNS, (*again.estimate.T, again.demand), strict=True))
 
 

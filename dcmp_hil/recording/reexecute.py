@@ -34,7 +34,7 @@ _AT = {name: place for place, name in enumerate(FIELDS)}
 
 
 @dataclass(frozen=True)
-class Again:
+class Reexecution:
     """Estimates and demands of observer and controller for the samples of a run.
 
     Parameters
@@ -49,7 +49,7 @@ class Again:
     demand: NDArray[np.float64]
 
 
-def run_again(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Again:
+def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Reexecution:
     """Hand the recorded samples, references and voltages to observer, predictor and controller.
 
     Changes that were made while it went on are made again, in the same cycle.
@@ -80,14 +80,14 @@ def run_again(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
         source = UnreadTable(recorded.path, rig.reference)
     trajectory = Trajectory(source, rig.reference.soft_start_s)
     try:
-        return _run_again(recorded, rig, trajectory)
+        return _reexecute(recorded, rig, trajectory)
     except (ArithmeticError, ValueError) as error:
         raise ConfigError(
             f"{recorded.path}: its numbers are beyond what observer and controller can take ({error})."
         ) from None
 
 
-def _run_again(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Again:
+def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexecution:
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     measured = rig.controller.position == "measured"
     predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
@@ -107,12 +107,12 @@ def _run_again(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Again
         if made and made[0][0] <= sample.t:  # later where the period itself is missing
             mailbox.put(made.popleft()[1])
         changes.apply(sample.t)
-    again = Again(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+    again = Reexecution(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
     _check_own(again, observer, controller)
     return again
 
 
-def _check_own(again: Again, *stages: object) -> None:
+def _check_own(again: Reexecution, *stages: object) -> None:
     """Refuse what a class of the user's own failed at, unless the recorded run ended there."""
     failed = np.isnan(again.demand) | np.isnan(again.estimate).any(axis=1)
     for stage in stages:

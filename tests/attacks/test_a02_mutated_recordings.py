@@ -21,7 +21,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording import export
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import RecordedRun, read_run
-from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.writer import Recording
 from tests.attacks.mutations import KINDS, mutant, records
 from tests.helpers import bench
@@ -150,7 +150,7 @@ def test_two_thousand_mutants_give_no_wrong_row(originals: list[Original], tmp_p
         export.to_csv(got, csv)
         if fault := _wrong_lines(original, csv):
             wrong.append(f"{number} {kind}: {fault}")
-        assert len(run_again(got).demand) == len(got.rows)
+        assert len(reexecute(got).demand) == len(got.rows)
     assert wrong == []
     assert {kind.partition(":")[0] for kind in told} == set(KINDS)
     assert sum(told.values()) == _MUTANTS

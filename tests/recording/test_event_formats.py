@@ -22,7 +22,7 @@ from dcmp_hil.recording.format_1 import event_of_format_1
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.recorded_changes import changes_in
-from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.schema import event_from, event_to_bytes
 from dcmp_hil.recording.writer import Recording
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
@@ -93,10 +93,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
 def test_rewording_every_sentence_changes_no_replay(recorded: RecordedRun) -> None:
     reworded = replace(recorded, events=scrambled(recorded.events))
     assert len(changes_in(reworded.events, reworded.rig)) == len(SCRIPT)
-    assert compare(recorded, run_again(reworded)).identical
+    assert compare(recorded, reexecute(reworded)).identical
     for kind in (EventKind.CHANGE, EventKind.LOWERING):  # and each of the two is needed for it
         without = tuple(event for event in recorded.events if event.kind is not kind)
-        assert not compare(recorded, run_again(replace(recorded, events=without))).identical
+        assert not compare(recorded, reexecute(replace(recorded, events=without))).identical
 
 
 def test_rewording_every_sentence_changes_nothing_of_the_dashboard_but_its_log(
@@ -202,10 +202,10 @@ def test_a_recording_of_format_1_is_read() -> None:
 
 def test_a_recording_of_format_1_is_replayed_to_the_bit() -> None:
     run = read_run(OLD)
-    assert compare(run, run_again(run)).identical
+    assert compare(run, reexecute(run)).identical
     for kind in (EventKind.CHANGE, EventKind.LOWERING):
         without = tuple(event for event in run.events if event.kind is not kind)
-        assert not compare(run, run_again(replace(run, events=without))).identical
+        assert not compare(run, reexecute(replace(run, events=without))).identical
 
 
 def test_an_event_that_is_none_is_left_out_and_told(tmp_path: Path) -> None:

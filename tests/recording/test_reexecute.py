@@ -16,7 +16,7 @@ from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.recorded_changes import changes_in
-from dcmp_hil.recording.reexecute import run_again
+from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.writer import Recording
 from tests.helpers import bench, named
 from tests.live.here import ChangedRun
@@ -57,7 +57,7 @@ def record(folder: Path, *overrides: str, duration: float = 3.0) -> Path:
 )
 def test_the_same_gains_give_the_same_numbers_to_the_bit(tmp_path: Path, overrides: tuple[str, ...]) -> None:
     recorded = read_run(record(tmp_path, *overrides))
-    result = compare(recorded, run_again(recorded))
+    result = compare(recorded, reexecute(recorded))
     assert result.identical
     assert result.rows == len(recorded.rows) > 2000
     assert {line.again for line in result.figures if "difference" in line.name} == {0.0}
@@ -69,7 +69,7 @@ def test_lost_samples_are_lost_again(tmp_path: Path, cli: Cli) -> None:
     (folder,) = (tmp_path / "runs").iterdir()
     recorded = read_run(folder)
     assert len(recorded.rows) < 2950
-    assert compare(recorded, run_again(recorded)).identical
+    assert compare(recorded, reexecute(recorded)).identical
     assert json.loads(recorded.run["faults"]) == [fault[1]]
 
 
@@ -96,17 +96,17 @@ def test_changes_made_in_a_run_are_made_again(tmp_path: Path, script: dict[int, 
     assert {answer.what for answer in changed.answers if answer} == {APPLIED}
     recorded = read_run(tmp_path)
     assert len(changes_in(recorded.events, recorded.rig)) == len(script)
-    assert compare(recorded, run_again(recorded)).identical
+    assert compare(recorded, reexecute(recorded)).identical
     told = friction == "true" or any(
         not key.startswith("reference") for keys in script.values() for key in keys
     )
-    assert compare(recorded, run_again(replace(recorded, events=()))).identical != told  # references are rows
+    assert compare(recorded, reexecute(replace(recorded, events=()))).identical != told  # references are rows
 
 
 def test_one_bit_of_difference_is_one(tmp_path: Path) -> None:
     recorded = read_run(record(tmp_path, duration=1.0))
     recorded.rows[500, 1] = np.nextafter(recorded.rows[500, 1], 9.0)
-    assert not compare(recorded, run_again(recorded)).identical
+    assert not compare(recorded, reexecute(recorded)).identical
 
 
 class Mine:
@@ -122,7 +122,7 @@ class Mine:
 def test_a_controller_of_one_s_own_runs_again(tmp_path: Path) -> None:
     own = (f"controller.kind={named(Mine)}", "controller.options={gain = 60.0}")
     recorded = read_run(record(tmp_path, *own))
-    assert compare(recorded, run_again(recorded, trust=True)).identical
+    assert compare(recorded, reexecute(recorded, trust=True)).identical
 
 
 # ------------------------------------------------------------------------------------------ command line
