@@ -32,9 +32,9 @@ def status_line(period: float) -> Sink:
 
 def recording(path: Path, period: float, run: dict[str, str], rig: str) -> Sink:
     """Return the run's own recording."""
-    from dcmp_hil.recording.writer import Recording
+    from dcmp_hil.recording.writer import RecordingSink
 
-    return Recording(path, period, run, rig)
+    return RecordingSink(path, period, run, rig)
 
 
 def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> Sink:

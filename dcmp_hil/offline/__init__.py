@@ -8,7 +8,7 @@ result.figures.velocity_error_rms_rad_s
 from dcmp_hil.offline.error_metrics import Estimates, Figures
 from dcmp_hil.offline.export import columns, write_csv, write_rrd
 from dcmp_hil.offline.reading import read_recording
-from dcmp_hil.offline.recording import ColumnOptions, Recording
+from dcmp_hil.offline.recording import ColumnOptions, LoggedSignals
 from dcmp_hil.offline.resolution import estimate_counts_per_rev
 from dcmp_hil.offline.run import ReplayResult, replay
 from dcmp_hil.offline.settings import ReplaySettings
@@ -18,7 +18,7 @@ __all__ = [
     "ColumnOptions",
     "Estimates",
     "Figures",
-    "Recording",
+    "LoggedSignals",
     "ReplayResult",
     "ReplaySettings",
     "ZeroPhase",

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.recording import LoggedSignals
     from dcmp_hil.offline.zero_phase import ZeroPhase
 
 _ROUNDING_RAD_S2 = 1e-12  # rad/s2: what rounding leaves of a constant
@@ -72,7 +72,7 @@ class Figures:
         return asdict(self)
 
 
-def sampling(recording: Recording, period: float, begins: NDArray[np.bool_]) -> dict[str, Any]:
+def sampling(recording: LoggedSignals, period: float, begins: NDArray[np.bool_]) -> dict[str, Any]:
     """Describe the sampling: the part of `Figures` that needs no observer.
 
     Parameters
@@ -100,7 +100,7 @@ def sampling(recording: Recording, period: float, begins: NDArray[np.bool_]) -> 
 
 
 def judge(
-    recording: Recording, estimates: Estimates, reference: ZeroPhase, judged: NDArray[np.bool_]
+    recording: LoggedSignals, estimates: Estimates, reference: ZeroPhase, judged: NDArray[np.bool_]
 ) -> dict[str, Any]:
     """Compare with the reference: the part of `Figures` that the observer answers for.
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.offline.error_metrics import Estimates
-    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.recording import LoggedSignals
     from dcmp_hil.offline.zero_phase import ZeroPhase
 
 _SPEED_MAX_RAD_S = 2000.0  # rad/s, 19,000 rpm
@@ -22,7 +22,7 @@ _ACCELERATION_RATIO_MAX = 5.0  # times the largest accelerations that input and 
 _GRAVITY_MAX_RAD_S2 = 50.0  # rad/s2, of an arm of 0.2 m
 
 
-def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.bool_]) -> None:
+def check_motion(recording: LoggedSignals, reference: ZeroPhase, judged: NDArray[np.bool_]) -> None:
     """Refuse a recording that no arm and no motor can have made.
 
     Raises
@@ -41,7 +41,7 @@ def check_motion(recording: Recording, reference: ZeroPhase, judged: NDArray[np.
 
 
 def check_assumed(
-    recording: Recording, reference: ZeroPhase, pushed: NDArray[np.float64], judged: NDArray[np.bool_]
+    recording: LoggedSignals, reference: ZeroPhase, pushed: NDArray[np.float64], judged: NDArray[np.bool_]
 ) -> None:
     """Refuse a position without a unit that moves far more fiercely than input and gravity explain.
 
@@ -72,7 +72,7 @@ def check_assumed(
 
 
 def check_estimates(
-    recording: Recording, estimates: Estimates, reference: ZeroPhase, judged: NDArray[np.bool_]
+    recording: LoggedSignals, estimates: Estimates, reference: ZeroPhase, judged: NDArray[np.bool_]
 ) -> None:
     """Refuse figures of an observer that is further off than the motion is large.
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.recording import LoggedSignals
 
 _PERIOD_MIN_S = 1e-6  # s: a shorter period is a wrong unit
 _USUAL_COUNTS = 4096.0  # where the recording tells nothing
@@ -53,7 +53,7 @@ class Preparation(NamedTuple):
     notes: tuple[str, ...]
 
 
-def prepare(recording: Recording, settings: ReplaySettings) -> Preparation:
+def prepare(recording: LoggedSignals, settings: ReplaySettings) -> Preparation:
     """Settle what the settings leave open, from the recording.
 
     Raises
@@ -74,7 +74,7 @@ def prepare(recording: Recording, settings: ReplaySettings) -> Preparation:
     return Preparation(observer, setting, applied, per_input * applied, notes)
 
 
-def _gains(recording: Recording, settings: ReplaySettings) -> tuple[float, float, tuple[str, ...]]:
+def _gains(recording: LoggedSignals, settings: ReplaySettings) -> tuple[float, float, tuple[str, ...]]:
     """Return the model's ku, what the input is multiplied by to be the voltage of a sample, and notes."""
     if recording.input_kind == "none":
         return settings.model.ku if settings.ku is None else settings.ku, 1.0, ()
@@ -93,7 +93,7 @@ def _gains(recording: Recording, settings: ReplaySettings) -> tuple[float, float
     return 1.0, 1.0 / settings.inertia, ()
 
 
-def _period(recording: Recording, settings: ReplaySettings) -> float:
+def _period(recording: LoggedSignals, settings: ReplaySettings) -> float:
     if settings.period is not None:
         return settings.period
     period = float(np.median(np.diff(recording.time)))
@@ -105,7 +105,7 @@ def _period(recording: Recording, settings: ReplaySettings) -> float:
     return period
 
 
-def _resolution(recording: Recording, settings: ReplaySettings) -> tuple[float | None, tuple[str, ...]]:
+def _resolution(recording: LoggedSignals, settings: ReplaySettings) -> tuple[float | None, tuple[str, ...]]:
     """Return the counts a revolution that the rules of mu0 and M go by, and where they come from."""
     if settings.counts_per_rev == IDEAL:
         return None, ()

@@ -12,7 +12,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import clock_times, is_clock, numbers
 from dcmp_hil.offline.column_choice import choose
 from dcmp_hil.offline.inputs import held, undamaged
-from dcmp_hil.offline.recording import ColumnOptions, Recording
+from dcmp_hil.offline.recording import ColumnOptions, LoggedSignals
 from dcmp_hil.offline.table import read_table
 from dcmp_hil.offline.timestamps import Stamps, epoch_unit, rising
 from dcmp_hil.offline.units import COUNTS, known_unit
@@ -47,11 +47,11 @@ class _Values(NamedTuple):
     period: float | None  # s, of evenly sampled rows
 
 
-def read_recording(path: Path, options: ColumnOptions | None = None) -> Recording:
+def read_recording(path: Path, options: ColumnOptions | None = None) -> LoggedSignals:
     """Read a recording with columns of time, position and torque or voltage, perhaps velocity.
 
     Text around the rows, rows without a number and rows that the file holds twice are left out. Counters
-    that wrap are continued, time and position alike. All of that is told in `Recording.notes`.
+    that wrap are continued, time and position alike. All of that is told in `LoggedSignals.notes`.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def read_recording(path: Path, options: ColumnOptions | None = None) -> Recordin
         )
         given = None
     applied = columns.input
-    return Recording(
+    return LoggedSignals(
         name=path.stem,
         time=stamps.time[keep],
         position=position[keep],

@@ -54,7 +54,7 @@ class ColumnOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class LoggedSignals:
     """Columns of equal length, in SI units.
 
     Parameters

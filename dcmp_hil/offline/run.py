@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.recording import LoggedSignals
 
 _LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
 _ROUNDING_S = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
@@ -50,7 +50,7 @@ class ReplayResult:
         What else the reader should know, one sentence each.
     """
 
-    recording: Recording
+    recording: LoggedSignals
     applied: NDArray[np.float64]
     estimates: Estimates
     reference: ZeroPhase
@@ -59,7 +59,7 @@ class ReplayResult:
     notes: tuple[str, ...]
 
 
-def replay(recording: Recording, settings: ReplaySettings | None = None) -> ReplayResult:
+def replay(recording: LoggedSignals, settings: ReplaySettings | None = None) -> ReplayResult:
     """Run an observer over a recording with the measured steps.
 
     Lost samples are longer steps. A gap of more than ten periods restarts the observer at rest where the arm
@@ -124,7 +124,7 @@ def _since_restart(time: NDArray[np.float64], begins: NDArray[np.bool_]) -> NDAr
     return time - time[np.maximum.accumulate(np.where(begins, np.arange(len(time)), 0))]
 
 
-def _run(observer: Observer, recording: Recording, voltage: NDArray[np.float64], gap: float) -> Estimates:
+def _run(observer: Observer, recording: LoggedSignals, voltage: NDArray[np.float64], gap: float) -> Estimates:
     """Run the line without a loop: one sample a row, its time counted from the first row.
 
     At a break the observer is shown a gap, so that it begins anew as it does after a real one.

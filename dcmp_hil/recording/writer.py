@@ -45,7 +45,7 @@ _CHUNK_BYTES_MIN = 2_000  # bytes of a chunk
 _MOST_LOST = 100  # stretches that the end names
 
 
-class Recording:
+class RecordingSink:
     """A sink that keeps every cycle and every event.
 
     A disk that is full is asked again with every block; what waits meanwhile is kept up to a bound, and

@@ -22,7 +22,7 @@ from dcmp_hil.recording import export
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import RecordedRun, read_run
 from dcmp_hil.recording.reexecute import reexecute
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from tests.attacks.mutations import KINDS, mutant, records
 from tests.helpers import bench
 from tests.memory import forget_peak, peak_mb
@@ -66,7 +66,7 @@ class Original:
 
 def _record(path: Path, *overrides: str, duration: float = 1.0) -> bytes:
     rig = bench(*overrides)
-    sink = Recording(path, rig.period, about(rig, "a note"), rig_json(rig))
+    sink = RecordingSink(path, rig.period, about(rig, "a note"), rig_json(rig))
     run(rig, duration=duration, fast=True, sinks=[sink])
     return path.read_bytes()
 

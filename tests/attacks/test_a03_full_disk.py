@@ -23,7 +23,7 @@ from dcmp_hil.recording.completeness import ending_of
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.write_buffer import Backlog
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from tests.helpers import bench
 from tests.namespaces import on_disk_of
 from tests.telemetry.runs import EVENTS, blocks
@@ -96,9 +96,9 @@ class _Fickle:
         return self._file.write(data[:taken]) or 0
 
 
-def _recorded(path: Path, disk: _Disk, room: int) -> tuple[Recording, np.ndarray]:
+def _recorded(path: Path, disk: _Disk, room: int) -> tuple[RecordingSink, np.ndarray]:
     rig = bench()
-    sink = Recording(path, rig.period, about(rig), rig_json(rig), partial(disk.open, room=room))
+    sink = RecordingSink(path, rig.period, about(rig), rig_json(rig), partial(disk.open, room=room))
     made = blocks(_PERIODS)
     for block in made:
         sink.block(block)

@@ -15,7 +15,7 @@ import pytest
 
 from dcmp_hil import run
 from dcmp_hil.recording.metadata import about, rig_json
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from tests.helpers import bench
 from tests.installed import environment
 
@@ -52,7 +52,7 @@ main()
 def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[str, Path]:
     """Return what a recording names, and its folder; what it names lies there, and in the current folder."""
     rig = bench("supervisor.start=immediate")
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), _naming(request.param))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), _naming(request.param))
     run(rig, duration=0.3, fast=True, sinks=[sink])
     (tmp_path / "evil_mine.py").write_text(_EVIL)
     (tmp_path / "evil.csv").write_text("time_s,position_rad\n0,0\n1,1\n")
@@ -94,7 +94,7 @@ def test_neither_replay_nor_export_touches_what_a_recording_names(foreign: tuple
 
 def test_trust_imports_and_own_choice_replaces(script: Script, tmp_path: Path) -> None:
     rig = bench()
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), _naming("controller"))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), _naming("controller"))
     run(rig, duration=0.3, fast=True, sinks=[sink])
     (tmp_path / "evil_mine.py").write_text(_EVIL)
     refused = script("replay", "run.mcap", cwd=tmp_path)

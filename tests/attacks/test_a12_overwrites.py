@@ -15,7 +15,7 @@ from dcmp_hil.cli.outputs import try_places
 from dcmp_hil.config import copy_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.metadata import about, rig_json
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from tests.cli.conftest import cli
 from tests.helpers import bench
 
@@ -49,7 +49,7 @@ def place(tmp_path: Path) -> Path:
     """Give a folder with a rig, a recording, and a file that matters."""
     copy_rig("bench-1khz", tmp_path / "my.toml")
     rig = bench()
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
     run(rig, duration=0.3, fast=True, sinks=[sink])
     (tmp_path / "there").write_text("mine")
     return tmp_path

@@ -24,7 +24,7 @@ from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.schema import event_from, event_to_bytes
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.parameter_table import Parameters
 from dcmp_hil.telemetry.rerun.rig_view import view_of
@@ -82,7 +82,7 @@ def scrambled(events: Iterable[Event]) -> tuple[Event, ...]:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
     overrides = ("controller.friction_feedforward=true", "run.end=lower")
     rig, path = bench(*overrides), tmp_path_factory.mktemp("run") / "run.mcap"
-    sink = Recording(path, rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(path, rig.period, about(rig), rig_json(rig))
     ChangedRun(SCRIPT, *overrides, duration=3.0, sinks=[sink]).run()
     return read_run(path)
 
@@ -210,7 +210,7 @@ def test_a_recording_of_format_1_is_replayed_to_the_bit() -> None:
 
 def test_an_event_that_is_none_is_left_out_and_told(tmp_path: Path) -> None:
     rig = load_rig("bench-1khz")
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
     sink.event(Event(0.0, "INFO", EventKind.PHASE, "no data"))
     sink.close()
     read = read_run(tmp_path)

@@ -26,7 +26,7 @@ from dcmp_hil.ipc.ring import FIELDS, Ring, size_of
 from dcmp_hil.recording import schema
 from dcmp_hil.recording.metadata import about, git_state, rig_json
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from dcmp_hil.session import Session
 from dcmp_hil.values import CauseData, Event, EventKind
 from tests.helpers import bench
@@ -47,10 +47,10 @@ def recorded(path: Path, periods: int = 500) -> list[Block]:
     return made
 
 
-def begun(path: Path, periods: int) -> tuple[Recording, list[Block]]:
+def begun(path: Path, periods: int) -> tuple[RecordingSink, list[Block]]:
     """Write a synthetic run without its end."""
     rig = bench()
-    sink = Recording(path, rig.period, about(rig, "a note", ["wire.drop"]), rig_json(rig))
+    sink = RecordingSink(path, rig.period, about(rig, "a note", ["wire.drop"]), rig_json(rig))
     made = blocks(periods)
     for event in EVENTS:
         sink.event(event)
@@ -84,7 +84,7 @@ def test_numbers_that_are_none_survive(tmp_path: Path) -> None:
     (block,) = blocks(3)
     block.rows[:] = [[math.nan], [math.inf], [-math.inf]]
     rig = bench()
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
     sink.block(block)
     sink.event(Event(math.inf, "ERROR", EventKind.TRIP, "so late", CauseData("late")))
     sink.close()
@@ -144,7 +144,7 @@ import sys
 from pathlib import Path
 from dcmp_hil.platform.clock import pause
 from dcmp_hil.recording.metadata import about, rig_json
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from dcmp_hil.telemetry.dispatcher import DispatchThread, SinkDispatcher
 from dcmp_hil.ipc.ring import Ring
 from tests.helpers import bench
@@ -153,7 +153,7 @@ rate, capacity, folder = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
 rig = bench(f"loop.rate_hz={rate}")
 with (folder / "ring").open("r+b") as file:
     ring = Ring(capacity, mmap.mmap(file.fileno(), 0))
-sink = Recording(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
+sink = RecordingSink(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
 service = DispatchThread(SinkDispatcher(ring, [sink]), sink.interval)
 (folder / "up").write_text("")
 while True:
@@ -213,11 +213,11 @@ def test_a_full_disk_is_told_and_what_is_there_is_read(tmp_path: Path) -> None:
     assert 1000 < len(read_run(path).rows) < 15_000
 
 
-def _limited(path: Path) -> Recording:
+def _limited(path: Path) -> RecordingSink:
     import resource
 
     rig = bench()
-    sink = Recording(path, rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(path, rig.period, about(rig), rig_json(rig))
     resource.setrlimit(resource.RLIMIT_FSIZE, (900_000, resource.RLIM_INFINITY))  # the figures need some
     return sink
 
@@ -236,7 +236,7 @@ def test_what_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
 
 def test_a_newer_format_is_refused_by_name(tmp_path: Path) -> None:
     rig = bench()
-    Recording(tmp_path / "run.mcap", rig.period, about(rig) | {"format": "3"}, rig_json(rig)).close()
+    RecordingSink(tmp_path / "run.mcap", rig.period, about(rig) | {"format": "3"}, rig_json(rig)).close()
     with pytest.raises(ConfigError, match="a recording of format 3; this version reads 2"):
         read_run(tmp_path)
 
@@ -244,7 +244,7 @@ def test_a_newer_format_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     rig = bench()
     with pytest.raises(ConfigError, match="Choose a folder that you may write in"):
-        Recording(tmp_path / "nowhere" / "run.mcap", rig.period, about(rig), rig_json(rig))
+        RecordingSink(tmp_path / "nowhere" / "run.mcap", rig.period, about(rig), rig_json(rig))
 
 
 @pytest.mark.parametrize("name", shipped_rigs())

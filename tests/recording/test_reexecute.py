@@ -17,7 +17,7 @@ from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.reexecute import reexecute
-from dcmp_hil.recording.writer import Recording
+from dcmp_hil.recording.writer import RecordingSink
 from tests.helpers import bench, named
 from tests.live.here import ChangedRun
 from tests.telemetry.runs import values
@@ -37,7 +37,7 @@ BOARD = "backend.kind=sim-board"
 
 def record(folder: Path, *overrides: str, duration: float = 3.0) -> Path:
     rig = bench(*overrides)
-    sink = Recording(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(folder / "run.mcap", rig.period, about(rig), rig_json(rig))
     run(rig, duration=duration, fast=True, sinks=[sink])
     return folder
 
@@ -90,7 +90,7 @@ def test_lost_samples_are_lost_again(tmp_path: Path, cli: Cli) -> None:
 def test_changes_made_in_a_run_are_made_again(tmp_path: Path, script: dict[int, Any], friction: str) -> None:
     overrides = (f"controller.friction_feedforward={friction}",)
     rig = bench(*overrides)
-    sink = Recording(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), rig_json(rig))
     changed = ChangedRun(script, *overrides, duration=4.0, sinks=[sink])
     changed.run()
     assert {answer.what for answer in changed.answers if answer} == {APPLIED}

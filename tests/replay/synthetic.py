@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.control.model import Model
-from dcmp_hil.offline import Recording
+from dcmp_hil.offline import LoggedSignals
 from sim_backend.plant import MoreauPlant
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ class Truth:
     def keep(self, rows: NDArray[np.bool_]) -> Truth:
         return Truth(self.time[rows], self.position[rows], self.voltage[rows], self.velocity[rows])
 
-    def recording(self, **changes: object) -> Recording:
+    def recording(self, **changes: object) -> LoggedSignals:
         columns = {"time": self.time, "position": self.position, "input": self.voltage}
-        return Recording(**{"name": "synthetic", "input_kind": "voltage", **columns, **changes})  # type: ignore[arg-type]
+        return LoggedSignals(**{"name": "synthetic", "input_kind": "voltage", **columns, **changes})  # type: ignore[arg-type]
 
 
 def swing(

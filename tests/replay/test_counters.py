@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.offline import ColumnOptions, Recording, ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, LoggedSignals, ReplaySettings, read_recording, replay
 from tests.replay.logged import COUNTS, HEADER, T, columns, figure, motion
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def counted(modulus: float, cpr: float, *, signed: bool, fast: float) -> list[st
 
 def unwrapped(cpr: float, fast: float) -> float:
     counts = np.round(turning(fast) * cpr / math.tau)
-    recording = Recording(
+    recording = LoggedSignals(
         name="turning",
         time=np.asarray(np.arange(3000) * T, dtype=np.float64),
         position=counts * math.tau / cpr,

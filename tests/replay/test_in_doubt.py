@@ -16,20 +16,20 @@ from tests.replay.logged import COUNTS, DEG, HEADER, TOLERANCE, columns, figure,
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dcmp_hil.offline.recording import Recording
+    from dcmp_hil.offline.recording import LoggedSignals
     from dcmp_hil.offline.units import Quantity
 
 
 UNITS: dict[Quantity, str] = {"time": "ms", "position": "deg", "voltage": "mV", "torque": "mN m"}
 
 
-def read(tmp_path: Path, content: str | bytes, **options: object) -> Recording:
+def read(tmp_path: Path, content: str | bytes, **options: object) -> LoggedSignals:
     path = tmp_path / "rec.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return read_recording(path, ColumnOptions(**options))  # type: ignore[arg-type]
 
 
-def rms(recording: Recording) -> float:
+def rms(recording: LoggedSignals) -> float:
     settings = ReplaySettings(ku=5.4, counts_per_rev=COUNTS)
     return replay(recording, settings).figures.velocity_error_rms_rad_s
 
