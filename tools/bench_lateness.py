@@ -210,7 +210,7 @@ class _Wire:
     other_carrier = ""
 
     def __init__(self, board: Board) -> None:
-        self._board, self._receiver = board, cobs.Receiver()
+        self._board, self._receiver = board, cobs.CobsDecoder()
         self._frames: deque[Frame] = deque()
         self._mark = self._inside = 0.0
         self.periods: list[float] = []  # s, the host's part

@@ -64,7 +64,7 @@ def codec_us() -> float:
     """Cost of a DRIVE from message to bytes and a SAMPLE from bytes to message, us."""
     drive = Drive(1234, 77, True, False, False, 4711, 20)
     sample = cobs.encode(pack(SampleReport(123_456, -1234, 88, 3, False, False, 0)))
-    receiver, count = cobs.Receiver(), 20_000
+    receiver, count = cobs.CobsDecoder(), 20_000
     began = time.process_time()
     for _ in range(count):
         cobs.encode(pack(drive))

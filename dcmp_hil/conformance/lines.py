@@ -131,7 +131,7 @@ class CobsLine:
 
     def __init__(self, port: RawPort) -> None:
         self.name, self._port = port.name, port
-        self._receiver = cobs.Receiver()
+        self._receiver = cobs.CobsDecoder()
         self._frames: deque[Frame] = deque()
         port.write(b"\0")  # ends what the line carried before
 
@@ -197,7 +197,7 @@ class SlcanLine:
         elif byte == _CR:
             line = bytes(self._line)
             self._line.clear()
-            frames = slcan.Receiver().feed(line + b"\r")
+            frames = slcan.SlcanDecoder().feed(line + b"\r")
             self._frames.extend(frames)
             if not frames:
                 self.damaged += line[:1] == b"t"

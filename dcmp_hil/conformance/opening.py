@@ -63,7 +63,10 @@ def open_line(
 
 def _listen(port: SerialPort, node: int, clock: Clock) -> str:
     """Return the carrier in which SAMPLEs come; nothing is written."""
-    receivers: dict[str, cobs.Receiver | slcan.Receiver] = {COBS: cobs.Receiver(), SLCAN: slcan.Receiver()}
+    receivers: dict[str, cobs.CobsDecoder | slcan.SlcanDecoder] = {
+        COBS: cobs.CobsDecoder(),
+        SLCAN: slcan.SlcanDecoder(),
+    }
     samples = dict.fromkeys(receivers, 0)
     came = 0
     deadline_ns = clock.now_ns() + int(1e9 * _LISTEN_S)

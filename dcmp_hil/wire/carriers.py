@@ -1,23 +1,25 @@
-"""Which carrier bytes are of, where it is not the one that was expected."""
+"""The carriers of frames on a serial line, and which of them bytes are of."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import CorruptFrameError, unpack
 from dcmp_hil.wire.messages import SampleReport
 
-if TYPE_CHECKING:
-    from dcmp_hil.wire.cobs import Receiver as Cobs
-    from dcmp_hil.wire.slcan import Receiver as Slcan
-
+ENCODERS = {"cobs": cobs.encode, "slcan": slcan.encode}
+"""Frames to bytes, by the name of the carrier."""
+DECODERS: dict[str, type[cobs.CobsDecoder | slcan.SlcanDecoder]] = {
+    "cobs": cobs.CobsDecoder,
+    "slcan": slcan.SlcanDecoder,
+}
+"""Bytes to frames, by the name of the carrier."""
 _SAMPLES_MIN = 2  # SAMPLEs: one may be an accident
 
 
-def has_samples(data: bytes, receiver: Cobs | Slcan) -> bool:
-    """Whether SAMPLEs are among these bytes, by the receiver of a carrier."""
+def has_samples(data: bytes, decoder: cobs.CobsDecoder | slcan.SlcanDecoder) -> bool:
+    """Whether SAMPLEs are among these bytes, by the decoder of a carrier."""
     found = 0
-    for frame in receiver.feed(data):
+    for frame in decoder.feed(data):
         try:
             found += isinstance(unpack(frame, frame[0] & 0xF), SampleReport)
         except CorruptFrameError:

@@ -37,7 +37,7 @@ def encode(frame: Frame) -> bytes:
     return stuffed + b"\0"
 
 
-class Receiver:
+class CobsDecoder:
     """Decodes frames from a stream of bytes in pieces of any length.
 
     What is no frame is dropped up to the next 0x00 and counted in `corrupt`.

@@ -20,7 +20,7 @@ def encode(frame: Frame) -> bytes:
     return b"t%03X%d%s\r" % (number, len(data), data.hex().upper().encode())
 
 
-class Receiver:
+class SlcanDecoder:
     """Decodes frames from a stream of bytes in pieces of any length.
 
     Answers of an adapter to commands are no frames and no damage; everything else is dropped up to the next

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.config.backends import SimBoard
 from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.carriers import DECODERS, ENCODERS
 from sim_backend.board.board import Board
 from sim_backend.pacer import Pacer
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Truth
     from dcmp_hil.wire.frame import Frame
-
-_CARRIERS = {"cobs": cobs, "slcan": slcan}
 
 
 class SimBoardBackend(DeviceBackend):
@@ -79,10 +77,8 @@ class BoardLink:
         self._board, self._pace = board, pace
         self._ticks = 0
         self._frames: deque[Frame] = deque()
-        self._receiver = _CARRIERS[carrier].Receiver() if carrier in _CARRIERS else None
-        self._encode: Callable[[Frame], bytes] | None = (
-            _CARRIERS[carrier].encode if carrier in _CARRIERS else None
-        )
+        self._receiver = DECODERS[carrier]() if carrier in DECODERS else None
+        self._encode: Callable[[Frame], bytes] | None = ENCODERS.get(carrier)
 
     @property
     def corrupt(self) -> int:

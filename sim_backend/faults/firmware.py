@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from dcmp_hil.wire import cobs, slcan
+from dcmp_hil.wire.carriers import DECODERS, ENCODERS
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.messages import Drive, Hello, Identity, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
 
-_CARRIERS: dict[str, Any] = {"cobs": cobs, "slcan": slcan}
 _SEQUENCE_MASK, _WORD = 0x1FFF, 2.0**32 - 1
 
 
@@ -119,15 +118,13 @@ class OtherVersion(WireFault):
     def _frames(self, piece: bytes) -> list[Frame]:
         if self.facts.carrier == "can":
             return [(int.from_bytes(piece[:2], "little"), piece[2:])]
-        frames: list[Frame] = _CARRIERS[self.facts.carrier].Receiver().feed(piece)
-        return frames
+        return DECODERS[self.facts.carrier]().feed(piece)
 
     def _piece(self, frame: Frame) -> bytes:
         if self.facts.carrier == "can":
             number, data = frame
             return number.to_bytes(2, "little") + data
-        encoded: bytes = _CARRIERS[self.facts.carrier].encode(frame)
-        return encoded
+        return ENCODERS[self.facts.carrier](frame)
 
 
 class Start(FaultModel):

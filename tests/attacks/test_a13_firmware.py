@@ -30,7 +30,7 @@ def late_ticks(system: System) -> int:
     """Return `late_ticks` of the newest HEALTH."""
     system.usart.sent.clear()
     system.run_for(120_000.0)
-    said = [unpack(frame, 0) for frame in cobs.Receiver().feed(b"\0" + bytes(system.usart.sent))]
+    said = [unpack(frame, 0) for frame in cobs.CobsDecoder().feed(b"\0" + bytes(system.usart.sent))]
     return [message.late_ticks for message in said if isinstance(message, Health)][-1]
 
 

@@ -31,7 +31,7 @@ class Oracle(FaultListener):
         self.peak_rad = self.peak_rad_s = 0.0
         self.ran = False
         self._limit_mV, self._watchdog = limit_mV, watchdog
-        self._ears, self._mouth = cobs.Receiver(), cobs.Receiver()
+        self._ears, self._mouth = cobs.CobsDecoder(), cobs.CobsDecoder()
         self._board: Board | None = None
         self._ticks = 0  # of the board, judged
         self._tick = first_tick - 1  # of the newest SAMPLE

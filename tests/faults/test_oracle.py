@@ -19,7 +19,7 @@ class TakesOldCommands(Board):
     """A board that accepts commands of any age."""
 
     def receive(self, data: bytes) -> None:
-        frame = next(iter(cobs.Receiver().feed(data)), None)
+        frame = next(iter(cobs.CobsDecoder().feed(data)), None)
         message = None if frame is None else unpack(frame)
         if isinstance(message, Drive):
             data = cobs.encode(pack(message._replace(seq=(self.tick_count - 1) % 8192)))
@@ -32,7 +32,7 @@ class HasNoWatchdog(Board):
     _last: Drive | None = None
 
     def receive(self, data: bytes) -> None:
-        frame = next(iter(cobs.Receiver().feed(data)), None)
+        frame = next(iter(cobs.CobsDecoder().feed(data)), None)
         message = None if frame is None else unpack(frame)
         self._last = message if isinstance(message, Drive) else self._last
         super().receive(data)

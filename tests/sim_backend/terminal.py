@@ -33,7 +33,7 @@ class Terminal:
     def __init__(self, path: str, carrier: str = "cobs") -> None:
         self._file = os.open(path, os.O_RDWR | os.O_NOCTTY)
         self._encode = cobs.encode if carrier == "cobs" else slcan.encode
-        self.receiver = cobs.Receiver() if carrier == "cobs" else slcan.Receiver()
+        self.receiver = cobs.CobsDecoder() if carrier == "cobs" else slcan.SlcanDecoder()
         self.seq = 0
 
     def close(self) -> None:

@@ -124,7 +124,7 @@ def test_amplifier_beyond_the_board_has_the_shortcomings_of_the_rig() -> None:
 def test_carriers_carry_the_same_frames(carrier: str) -> None:
     frames, stream = Board(bench(), carrier="can"), Board(bench(), carrier=carrier)
     encode = cobs.encode if carrier == "cobs" else slcan.encode
-    receiver = cobs.Receiver() if carrier == "cobs" else slcan.Receiver()
+    receiver = cobs.CobsDecoder() if carrier == "cobs" else slcan.SlcanDecoder()
     for k in range(250):
         for board in (frames, stream):
             board.tick()

@@ -135,7 +135,7 @@ def test_what_is_not_fetched_is_counted_and_does_not_grow() -> None:
     board = Board(bench(), carrier="cobs")
     for _ in range(1000):
         board.tick()
-    receiver = cobs.Receiver()
+    receiver = cobs.CobsDecoder()
     assert len(board.transmit()) <= 4096
     for _ in range(100):
         board.tick()

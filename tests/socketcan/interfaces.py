@@ -87,7 +87,7 @@ class Bridge:
         tty.setraw(self._line)
         self._raw = raw_socket(name)
         self._end, self._wish = os.pipe()
-        self._receiver = slcan.Receiver()
+        self._receiver = slcan.SlcanDecoder()
         self._thread = threading.Thread(target=self._carry, name="bridge", daemon=True)
 
     def __enter__(self) -> None:

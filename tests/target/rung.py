@@ -96,7 +96,7 @@ def never_on(system: System, since_us: float) -> bool:
 
 def said_of(system: System, parameter: Parameter) -> int:
     """Ask a board that boots over its serial line."""
-    receiver = cobs.Receiver()
+    receiver = cobs.CobsDecoder()
     system.usart.sent.clear()
     system.usart.hear(cobs.encode(pack(ParameterGet(parameter), 0)))
     system.run_for(3000.0)
@@ -108,5 +108,5 @@ def state_of(system: System) -> State:
     """Read the state that a booted board's newest sample shows."""
     system.usart.sent.clear()
     system.run_for(3000.0)
-    said = [unpack(frame, 0) for frame in cobs.Receiver().feed(b"\0" + bytes(system.usart.sent))]
+    said = [unpack(frame, 0) for frame in cobs.CobsDecoder().feed(b"\0" + bytes(system.usart.sent))]
     return State([message.state for message in said if isinstance(message, SampleReport)][-1])

@@ -64,7 +64,7 @@ class SerialLink:
         self._baud, self._listen_only = baud, listen_only
         self._serial: serial.Serial | None = None
         self._poll = select.poll()
-        self._receiver = cobs.Receiver()
+        self._receiver = cobs.CobsDecoder()
         self._frames: deque[Frame] = deque()
         self._more = True
         self._first = b""  # what was read before the first frame
@@ -78,7 +78,7 @@ class SerialLink:
     @property
     def other_carrier(self) -> str:
         """Settings for slcan, if that is what was heard."""
-        if not has_samples(self._first, slcan.Receiver()):
+        if not has_samples(self._first, slcan.SlcanDecoder()):
             return ""
         return f"--set backend.kind=can --set backend.interface=slcan --set backend.channel={self.name}"
 

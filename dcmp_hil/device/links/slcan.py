@@ -60,7 +60,7 @@ class SlcanBus(can.BusABC):
             raise ConfigError(
                 f"backend.bitrate: got {bitrate}; slcan has {', '.join(map(str, _BITRATES))} bit/s."
             )
-        self._receiver = slcan.Receiver()
+        self._receiver = slcan.SlcanDecoder()
         self._frames: deque[Frame] = deque()
         self._listen_only = listen_only
         self._first = b""  # of what was read
@@ -81,7 +81,7 @@ class SlcanBus(can.BusABC):
     @property
     def is_cobs(self) -> bool:
         """Whether what was heard first are COBS frames of a device of ours."""
-        return has_samples(self._first, cobs.Receiver())
+        return has_samples(self._first, cobs.CobsDecoder())
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - never waits
         """Send a frame; what the port has no room for is dropped."""
