@@ -14,7 +14,7 @@ from dcmp_hil.wire.link_diagnosis import DeviceCounters
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
-    from dcmp_hil.telemetry.statistics import Histogram
+    from dcmp_hil.telemetry.statistics import DurationHistogram
 
 _BARS = " ▁▂▃▄▅▆▇█"
 
@@ -113,7 +113,7 @@ def _durations(result: Result) -> Table:
     return table
 
 
-def _bars(histogram: Histogram) -> str:
+def _bars(histogram: DurationHistogram) -> str:
     """Draw counts on a logarithmic scale, a character a bar, between the first bound and the last."""
     if not histogram.counts:
         return ""

@@ -29,7 +29,7 @@ class Percentiles:
 
 
 @dataclass(frozen=True, slots=True)
-class Histogram:
+class DurationHistogram:
     """Histogram of durations, with a resolution of 1 %."""
 
     up_to_us: tuple[float, ...]
@@ -60,9 +60,9 @@ class Summary:
     lateness_us: Percentiles
     compute_us: Percentiles
     """From a sample's arrival to its command's departure."""
-    period_histogram: Histogram
-    lateness_histogram: Histogram
-    compute_histogram: Histogram
+    period_histogram: DurationHistogram
+    lateness_histogram: DurationHistogram
+    compute_histogram: DurationHistogram
     rate_error_ppm: float | None
     """By how much samples came too slowly (+) by the host's clock, from both ends of the window."""
     realtime_factor: float
@@ -127,15 +127,15 @@ class Durations:
         p50, p99, p999 = (round(1e6 * float(v), 3) for v in np.clip(middle, self._min, self._max))
         return Percentiles(p50, p99, p999, round(1e6 * self._max, 3))
 
-    def histogram(self) -> Histogram:
+    def histogram(self) -> DurationHistogram:
         """Return the counts between 1, 2, 5, 10 ... us."""
         below = np.append(np.cumsum(self.counts), 0)[self._BOUNDS - 1]
         counts = np.diff(below, prepend=0, append=self.counts.sum())
         some = np.flatnonzero(counts)
         if not len(some):
-            return Histogram((), ())
+            return DurationHistogram((), ())
         shown = slice(int(some[0]), int(some[-1]) + 1)
-        return Histogram((*BOUNDS_US, math.inf)[shown], tuple(counts[shown].tolist()))
+        return DurationHistogram((*BOUNDS_US, math.inf)[shown], tuple(counts[shown].tolist()))
 
 
 class Statistics:

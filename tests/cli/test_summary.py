@@ -10,7 +10,7 @@ from dcmp_hil import run
 from dcmp_hil.cli.status_line import StatusLine
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.platform.realtime import Grant
-from dcmp_hil.telemetry.statistics import Histogram
+from dcmp_hil.telemetry.statistics import DurationHistogram
 from tests.helpers import bench
 from tests.telemetry.runs import T, blocks
 
@@ -28,7 +28,7 @@ def test_summary_says_what_was_not_granted_and_nothing_of_what_was() -> None:
 def test_summary_draws_the_durations_between_the_first_bound_and_the_last() -> None:
     console = Console(width=200, force_terminal=False)
     result = run(bench(), duration=0.1, fast=True)
-    lateness = Histogram((20.0, 50.0, 100.0), (1000, 0, 1))
+    lateness = DurationHistogram((20.0, 50.0, 100.0), (1000, 0, 1))
     with console.capture() as shown:
         figures = replace(result.summary, lateness_histogram=lateness)
         console.print(summary_table(result.rig, replace(result, summary=figures), "duration"))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.statistics import BOUNDS_US, Durations, Histogram, Statistics, Summary
+from dcmp_hil.telemetry.statistics import BOUNDS_US, DurationHistogram, Durations, Statistics, Summary
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -145,9 +145,9 @@ def test_a_histogram_counts_every_duration_once_between_its_bounds() -> None:
 
 def test_a_histogram_shows_no_empty_ends() -> None:
     durations = Durations()
-    assert durations.histogram() == Histogram((), ())
+    assert durations.histogram() == DurationHistogram((), ())
     durations.add(1e-6 * np.array([30.0, 300.0]))
-    assert durations.histogram() == Histogram((50.0, 100.0, 200.0, 500.0), (1, 0, 0, 1))
+    assert durations.histogram() == DurationHistogram((50.0, 100.0, 200.0, 500.0), (1, 0, 0, 1))
 
 
 def test_statistics_measure_tracking_when_no_truth_is_known() -> None:

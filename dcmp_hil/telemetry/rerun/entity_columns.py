@@ -9,7 +9,7 @@ import rerun as rr
 
 from dcmp_hil.telemetry.link_events import in_order
 from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
-from dcmp_hil.telemetry.rerun.histogram import Histogram
+from dcmp_hil.telemetry.rerun.histogram import FixedRangeHistogram
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
 from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
@@ -51,7 +51,7 @@ class Frames:
         self.plots: dict[str, list[Signal]] = {}
         self._rig = rig
         self._histograms = {
-            field: Histogram(low * rig.period, high * rig.period)
+            field: FixedRangeHistogram(low * rig.period, high * rig.period)
             for field, (_, low, high, _) in HISTOGRAMS.items()
         }
         self._lanes = {name: TransitionDetector() for name in ("voltage", "samples")}

@@ -13,7 +13,7 @@ _BINS = 61  # odd, so that a nominal period lies in the middle of a bar
 _SEND_PERIOD_S = 1.0  # s between two pictures of it
 
 
-class Histogram:
+class FixedRangeHistogram:
     """Counts of durations between two bounds; what lies outside is in the first and the last bar.
 
     Parameters
