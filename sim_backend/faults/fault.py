@@ -24,7 +24,7 @@ KINDS = {**WIRE, **FIRMWARE, **PLANT, **HOST}
 When = int | float | str | Callable[[FaultContext], bool]
 
 
-class Fault:
+class FaultSpec:
     """One fault of a plan: kind, time and parameters.
 
     Parameters
@@ -61,7 +61,7 @@ class Fault:
             raise WrongFaultError(faults)
 
     @classmethod
-    def of(cls, text: str) -> Fault:
+    def of(cls, text: str) -> FaultSpec:
         """Read one from text, such as ``wire.drop:p=0.2,at=3s,for=1s``."""
         kind, said = parse(text, KINDS)
         at, length = said.pop("at", 0), float(said.pop("for", math.inf))
@@ -70,3 +70,7 @@ class Fault:
     def make(self, facts: RigFacts, rng: random.Random) -> FaultModel:
         """Return the model of the fault for one run."""
         return KINDS[self.kind].make(facts, rng, **self.params)
+
+
+Fault = FaultSpec
+"""The name before; `FaultSpec` is not to be taken for the fault codes of a device, `dcmp_hil.Fault`."""

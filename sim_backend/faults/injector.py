@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample, Truth
     from sim_backend.encoder import Encoder
     from sim_backend.faults.base import FaultModel, RigFacts
-    from sim_backend.faults.fault import Fault
+    from sim_backend.faults.fault import FaultSpec
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
     from sim_backend.plant import Plant
@@ -44,7 +44,7 @@ class Timer:
         s.
     """
 
-    def __init__(self, fault: Fault, effect: FaultModel, period: float) -> None:
+    def __init__(self, fault: FaultSpec, effect: FaultModel, period: float) -> None:
         self.effect = effect
         self.began: int | None = None  # tick
         self._when = fault.at if callable(fault.at) else None
@@ -89,7 +89,7 @@ class Injector:
 
     def __init__(
         self,
-        faults: Sequence[Fault],
+        faults: Sequence[FaultSpec],
         seed: int,
         facts: RigFacts,
         listener: FaultListener | None = None,

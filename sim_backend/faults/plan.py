@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.config.backends import Device, SimBoard
 from dcmp_hil.errors import ConfigError
 from sim_backend.faults.base import RigFacts
-from sim_backend.faults.fault import KINDS, Fault
+from sim_backend.faults.fault import KINDS, FaultSpec
 from sim_backend.faults.injector import Injector
 from sim_backend.faults.parser import WrongFaultError
 
@@ -33,8 +33,8 @@ class FaultPlan:
         Of everything in them that is random.
     """
 
-    def __init__(self, faults: Iterable[Fault] = (), seed: int = 1) -> None:
-        self.faults: Sequence[Fault] = tuple(faults)
+    def __init__(self, faults: Iterable[FaultSpec] = (), seed: int = 1) -> None:
+        self.faults: Sequence[FaultSpec] = tuple(faults)
         self.seed = seed
 
     def on(self, rig: Rig, listener: FaultListener | None = None, board: Board | None = None) -> Injector:
@@ -60,7 +60,7 @@ class FaultPlan:
         return Injector(self.faults, self.seed, _facts(rig), listener, board)
 
 
-def needs_wire(faults: Iterable[str | Fault]) -> bool:
+def needs_wire(faults: Iterable[str | FaultSpec]) -> bool:
     """Whether one of the faults is of a wire or of the firmware; one that cannot be read is not."""
     named = (fault.partition(":")[0].strip() if isinstance(fault, str) else fault.kind for fault in faults)
     return any(kind in KINDS and KINDS[kind].wired for kind in named)
@@ -83,7 +83,7 @@ def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Injector
     ConfigError
         With everything that is wrong.
     """
-    made: list[Fault] = []
+    made: list[FaultSpec] = []
     wrong: list[str] = []
     for fault in faults:
         try:
@@ -98,12 +98,12 @@ def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Injector
     raise ConfigError(*(f"{key} {sentence}" for sentence in wrong))
 
 
-def _read(fault: object) -> Fault:
-    if isinstance(fault, Fault):
+def _read(fault: object) -> FaultSpec:
+    if isinstance(fault, FaultSpec):
         return fault
     if isinstance(fault, str):
-        return Fault.of(fault)
-    raise WrongFaultError([f"got {fault!r}; expected a text such as wire.drop:p=0.2,at=3s, or a Fault."])
+        return FaultSpec.of(fault)
+    raise WrongFaultError([f"got {fault!r}; expected a text such as wire.drop:p=0.2,at=3s, or a FaultSpec."])
 
 
 def _facts(rig: Rig) -> RigFacts:
@@ -119,7 +119,7 @@ def _facts(rig: Rig) -> RigFacts:
     )
 
 
-def _misfit(fault: Fault, rig: Rig) -> str:
+def _misfit(fault: FaultSpec, rig: Rig) -> str:
     backend = rig.backend
     got = f'{fault.kind}: got backend.kind = "{backend.kind}"'
     if not backend.simulated:

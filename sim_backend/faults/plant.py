@@ -142,7 +142,7 @@ class Glitch(PlantFault):
         return counts + round(self.number("counts")) if wrong else counts
 
 
-class Noise(PlantFault):
+class EncoderNoise(PlantFault):
     """The encoder has Gaussian noise, in whole counts."""
 
     def count(self, counts: float) -> float:
@@ -256,7 +256,7 @@ PLANT = {
     "plant.enc_stuck": Kind(Stuck, "the encoder shows one position for ever"),
     "plant.enc_jump": Kind(Jump, "the count jumps, and stays", {"counts": _COUNTS, **_OFTEN}),
     "plant.enc_glitch": Kind(Glitch, "the count is wrong for a period", {"counts": _COUNTS, **_OFTEN}),
-    "plant.enc_noise": Kind(Noise, "the encoder is noisy", {"counts": Number("counts", 0, 1e4, 1)}),
+    "plant.enc_noise": Kind(EncoderNoise, "the encoder is noisy", {"counts": Number("counts", 0, 1e4, 1)}),
     "plant.enc_missed": Kind(Missed, "counts get lost", {"p": Number("", 0, 1, 0.02)}),
     "plant.enc_sign": Kind(EncoderSign, "the encoder counts the other way"),
     "plant.cpr": Kind(Scale, "the encoder has other counts/rev", {"factor": Number("", 0.01, 100, 4)}),

@@ -95,7 +95,7 @@ class Flip(RandomFault):
         return (bytes(changed),)
 
 
-class Noise(WireFault):
+class BitErrors(WireFault):
     """Turns every bit over with the same small probability, those of a delimiter too."""
 
     def change(self, piece: bytes, way: Way) -> Iterable[bytes]:  # noqa: ARG002
@@ -183,7 +183,7 @@ class Reorder(Timed):
         return ()
 
 
-class Hold(Timed):
+class Stall(Timed):
     """Stops for a while, then everything comes in one burst."""
 
     _until = 0
@@ -241,7 +241,7 @@ WIRE = {
         wired=True,
     ),
     "wire.noise": Kind(
-        Noise,
+        BitErrors,
         "bits are turned over, each with `rate`",
         {"rate": _probability(0.001), "way": _WAY},
         wired=True,
@@ -266,7 +266,7 @@ WIRE = {
     ),
     "wire.garble": Kind(Garble, "noise instead of pieces", {"p": _probability(1.0), "way": _WAY}, wired=True),
     "wire.hold": Kind(
-        Hold, "silence, then a burst", {"ms": Number("ms", 1, 2000, 200), "way": _WAY}, wired=True
+        Stall, "silence, then a burst", {"ms": Number("ms", 1, 2000, 200), "way": _WAY}, wired=True
     ),
     "wire.blackhole": Kind(RandomFault, "nothing arrives", {"p": _probability(1.0), "way": _WAY}, wired=True),
     "wire.unplug": Kind(Unplug, "the line hangs up", wired=True),

@@ -18,7 +18,7 @@ from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from dcmp_hil.wire.messages import State
 from sim_backend.board.board import Board
-from sim_backend.faults.fault import Fault
+from sim_backend.faults.fault import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 
@@ -99,7 +99,7 @@ def judge_plain(row: Row, seed: int) -> Verdict:
 def prepare(row: Row, seed: int, make: type[Board], *overrides: str) -> Bench:
     """Make rig, plan, board and oracle of a cell; everything about them follows from the seed."""
     rng = random.Random(f"{row.name} {seed}")
-    fault = Fault.of(row.fault)
+    fault = FaultSpec.of(row.fault)
     drawn = not re.search("[:,]at=", row.fault)
     short = drawn and row.fault.startswith(_CARELESS)
     window, length = _SHORT if short else _WHOLE
@@ -116,7 +116,7 @@ def prepare(row: Row, seed: int, make: type[Board], *overrides: str) -> Bench:
     return Bench(rig, length, again, plan, make(rig, carrier="cobs", **arguments), oracle)
 
 
-def _start(fault: Fault) -> dict[str, int]:
+def _start(fault: FaultSpec) -> dict[str, int]:
     """Return how the board boots."""
     if fault.kind != "firmware.start":
         return {}

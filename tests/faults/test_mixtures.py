@@ -12,7 +12,7 @@ from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from sim_backend.board.board import Board
 from sim_backend.faults.base import Choice
-from sim_backend.faults.fault import KINDS, Fault
+from sim_backend.faults.fault import KINDS, FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.matrix import outcome_of, same_session
 from tests.faults.oracle import Oracle
@@ -29,7 +29,7 @@ REASONS = {
 pytestmark = pytest.mark.usefixtures("untraced")
 
 
-def drawn(rng: random.Random) -> Fault:
+def drawn(rng: random.Random) -> FaultSpec:
     """Draw a fault with parameters anywhere in their bounds, small ones as often as large ones."""
     name = rng.choice([kind for kind in KINDS if kind != "firmware.start"])
     params: dict[str, float | str] = {}
@@ -39,7 +39,7 @@ def drawn(rng: random.Random) -> Fault:
         else:
             params[key] = min(param.high, max(param.low, param.default * 10 ** rng.uniform(-1.5, 1.5)))
     at = "boot" if rng.random() < _FROM_BOOT else rng.uniform(0.0, 0.8)
-    return Fault(name, at, rng.uniform(0.001, 0.4), **params)
+    return FaultSpec(name, at, rng.uniform(0.001, 0.4), **params)
 
 
 def mixed(seed: int) -> tuple[str, list[str], list[str]]:

@@ -10,7 +10,7 @@ from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.wire.messages import State
 from sim_backend.board.board import Board
-from sim_backend.faults.fault import Fault
+from sim_backend.faults.fault import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 
@@ -22,7 +22,7 @@ def _run(*overrides: str, fault: str = "") -> tuple[Session, Board, Exception]:
     """Run until the supervisor ends it; return what is left."""
     rig = load_rig("bench-1khz", (*_RIG, *overrides))
     board, oracle = Board(rig, carrier="cobs"), Oracle()
-    plan = FaultPlan([Fault.of(fault)] if fault else [])
+    plan = FaultPlan([FaultSpec.of(fault)] if fault else [])
     session = Session(rig, duration=6.0, fast=True, faults=plan.on(rig, oracle, board))
     with pytest.raises((TripError, DeadlineError)) as caught:
         session.run()

@@ -16,7 +16,7 @@ from dcmp_hil.ipc.mailbox import APPLIED
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.session import Session
 from sim_backend.faults.base import Number
-from sim_backend.faults.fault import KINDS, Fault
+from sim_backend.faults.fault import KINDS, FaultSpec
 from sim_backend.faults.host import InjectedError
 from sim_backend.faults.parser import WrongFaultError
 from sim_backend.faults.plan import FaultPlan, inject
@@ -39,7 +39,7 @@ def same_host(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(secrets, "randbelow", lambda below: below // 2)
 
 
-def quick(*faults: Fault, backend: str = BOARD, duration: float = 0.2, seed: int = 1) -> Result:
+def quick(*faults: FaultSpec, backend: str = BOARD, duration: float = 0.2, seed: int = 1) -> Result:
     return run(bench(backend, QUICK, f"sim.seed={seed}"), duration=duration, fast=True, faults=faults)
 
 
@@ -51,7 +51,7 @@ def lost_at(result: Result) -> list[int]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_can_be_made_with_its_defaults(kind: str) -> None:
-    assert Fault.of(kind).params.keys() == KINDS[kind].params.keys()
+    assert FaultSpec.of(kind).params.keys() == KINDS[kind].params.keys()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -61,17 +61,17 @@ def test_every_number_has_bounds_around_its_default(kind: str) -> None:
             assert param.low <= param.default <= param.high
             for beyond in (math.nextafter(param.high, math.inf) * 2 + 1, math.nan):
                 with pytest.raises(WrongFaultError, match=name):
-                    Fault(kind, **{name: beyond})
+                    FaultSpec(kind, **{name: beyond})
 
 
 def test_text_says_what_the_constructor_says() -> None:
-    read = Fault.of("wire.drop: p=20%, burst=5, at=3s, for=200ms, way=up")
-    made = Fault("wire.drop", at=3.0, for_=0.2, p=0.2, burst=5, way="up")
+    read = FaultSpec.of("wire.drop: p=20%, burst=5, at=3s, for=200ms, way=up")
+    made = FaultSpec("wire.drop", at=3.0, for_=0.2, p=0.2, burst=5, way="up")
     assert (read.kind, read.at, read.params) == (made.kind, made.at, made.params)
     assert read.for_ == pytest.approx(made.for_)
-    assert Fault.of("wire.hold:ms=0.2s").params["ms"] == 200.0
-    assert Fault.of("plant.shove:rad_s2=1e2rad/s2").params["rad_s2"] == 100.0
-    assert Fault.of("wire.garble:at=boot").at == "boot"
+    assert FaultSpec.of("wire.hold:ms=0.2s").params["ms"] == 200.0
+    assert FaultSpec.of("plant.shove:rad_s2=1e2rad/s2").params["rad_s2"] == 100.0
+    assert FaultSpec.of("wire.garble:at=boot").at == "boot"
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_faults_of_the_host_act_on_an_observer_of_ones_own() -> None:
 
 
 def test_a_run_takes_texts_and_objects_together() -> None:
-    push = Fault("plant.shove", at=50, for_=10, rad_s2=100.0)
+    push = FaultSpec("plant.shove", at=50, for_=10, rad_s2=100.0)
     faulty = run(
         bench(BOARD, QUICK), duration=0.2, fast=True, faults=["wire.drop:p=1,at=100ms,for=2ms", push]
     )
@@ -166,21 +166,21 @@ def test_times_are_ticks_or_seconds_or_a_predicate() -> None:
         return moment.tick >= 50 and moment.truth.position < 1.0
 
     for at in (50, 0.05, at_fifty):
-        found = lost_at(quick(Fault("wire.drop", at=at, for_=4, p=1, way="down")))
+        found = lost_at(quick(FaultSpec("wire.drop", at=at, for_=4, p=1, way="down")))
         assert found == [50, 51, 52, 53], at
 
 
 @pytest.mark.parametrize("text", ["wire.drop:p=0.2", "wire.flip:p=0.2,way=down", "wire.reorder:p=0.3"])
 def test_a_seed_repeats_itself_to_the_bit_and_another_does_not(text: str) -> None:
     def lost(seed: int) -> list[int]:
-        return lost_at(quick(Fault.of(text), seed=seed, duration=0.3))
+        return lost_at(quick(FaultSpec.of(text), seed=seed, duration=0.3))
 
     assert lost(3) == lost(3) != lost(4)
 
 
 def test_one_fault_more_leaves_the_random_numbers_of_the_others_alone() -> None:
-    drop = Fault("wire.drop", p=0.1, way="down")
-    assert lost_at(quick(drop)) == lost_at(quick(drop, Fault("plant.enc_noise")))
+    drop = FaultSpec("wire.drop", p=0.1, way="down")
+    assert lost_at(quick(drop)) == lost_at(quick(drop, FaultSpec("plant.enc_noise")))
 
 
 def test_a_whole_verdict_repeats_itself() -> None:
@@ -189,7 +189,7 @@ def test_a_whole_verdict_repeats_itself() -> None:
 
 
 def test_a_plan_can_be_used_again() -> None:
-    plan = FaultPlan([Fault("wire.drop", p=0.2, way="down")])
+    plan = FaultPlan([FaultSpec("wire.drop", p=0.2, way="down")])
     rig = bench(BOARD, QUICK)
     sessions = [Session(rig, duration=0.2, fast=True, faults=plan.on(rig)) for _ in range(2)]
     for session in sessions:
@@ -206,7 +206,7 @@ def test_wire_faults_do_something_on_every_carrier(carrier: str, kind: str) -> N
     rig = bench(BOARD, QUICK, f"backend.carrier={carrier}")
     healthy = run(rig, duration=0.2, fast=True)
     likely = {"p": 0.3} if "p" in KINDS[kind].params else {}
-    session = Session(rig, duration=0.2, fast=True, faults=[Fault(kind, at=50, for_=50, **likely)])
+    session = Session(rig, duration=0.2, fast=True, faults=[FaultSpec(kind, at=50, for_=50, **likely)])
     outcome = outcome_of(session)
     assert outcome in {"completed", *SILENT, "CORRUPT_LINK", "LINK_DOWN"}
     result = session.result()
@@ -225,7 +225,7 @@ def test_every_healthy_run_is_the_same_with_an_empty_plan() -> None:
 
 
 def test_truth_counts_a_push_as_disturbance() -> None:
-    pushed = quick(Fault("plant.shove", rad_s2=30, way="up", at=50, for_=100), backend="backend.kind=sim")
+    pushed = quick(FaultSpec("plant.shove", rad_s2=30, way="up", at=50, for_=100), backend="backend.kind=sim")
     still = quick(backend="backend.kind=sim")
     at = slice(60, 140)
     gone = pushed.columns["disturbance_true_rad_s2"][at] - still.columns["disturbance_true_rad_s2"][at]

@@ -16,7 +16,7 @@ from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop
 from sim_backend.board.board import Board
-from sim_backend.faults.fault import Fault
+from sim_backend.faults.fault import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from sim_backend.pacer import Pacer
 from tests.helpers import bench
@@ -89,7 +89,7 @@ class System:
             rig_at(start.encoder), start_us=start.us, first_tick=start.tick, count_offset=start.encoder
         )
         self.judge = Judge(first_tick=start.tick, ticked=self._ticked)
-        faults = [Fault(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
+        faults = [FaultSpec(kind, math.inf, **params) for kind, params in FAULTS.items()]  # type: ignore[arg-type]
         self.rig = rig_at(start.encoder)
         self._injector = FaultPlan(faults, seed).on(self.rig, self.judge, self.board)
         effects = (timer.effect for timer in self._injector.timers)
