@@ -1,4 +1,4 @@
-"""From a rig to the stages of its line."""
+"""From a rig to the stages of the loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.live.changes import LiveChanges, NoChanges
-from dcmp_hil.loop import Line
+from dcmp_hil.loop import LoopStages
 from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
@@ -62,8 +62,8 @@ def assemble(
     stop: StopRequest | None = None,
     clear: bool = False,
     faults: Faults = NO_FAULTS,
-) -> tuple[Line, Recorder]:
-    """Make every stage of the line, and the recorder that it reports to.
+) -> tuple[LoopStages, Recorder]:
+    """Make every stage of the loop, and the recorder that it reports to.
 
     Raises
     ------
@@ -95,28 +95,28 @@ def assemble(
         stop=stop,
         chatter=chatter,
     )
-    outliers = make_outliers(rig)
-    stages = ((observer, rig.observer), (controller, rig.controller))
-    own = [cast("Check", stage) for stage, section in stages if isinstance(section, Custom)]
+    outlier_filter = make_outlier_filter(rig)
+    sections = ((observer, rig.observer), (controller, rig.controller))
+    own = [cast("Check", stage) for stage, section in sections if isinstance(section, Custom)]
     notify = changes.event if changes else recorder.event
-    supervisor = make_supervisor(rig, notify, [outliers, *own], chatter)
-    line = Line(
+    supervisor = make_supervisor(rig, notify, [outlier_filter, *own], chatter)
+    stages = LoopStages(
         backend=backend,
-        outliers=outliers,
+        outlier_filter=outlier_filter,
         observer=faults.observer(observer),
         predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
         trajectory=trajectory,
         controller=faults.controller(controller),
         supervisor=supervisor,
         telemetry=recorder,
-        overruns=DeadlineMonitor(
+        deadline_monitor=DeadlineMonitor(
             rig.period, rig.timing.overrun_limit if rig.timing.overrun == "stop" else None
         ),
         clock=clock,
         delay=rig.delay,
         changes=changes or NoChanges(),
     )
-    return line, recorder
+    return stages, recorder
 
 
 def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
@@ -183,7 +183,7 @@ def make_chatter(rig: Rig) -> Chatter:
 
 
 def make_limiter(rig: Rig, notify: Callable[[Event], None]) -> Limiter:
-    """Make the clamps on what the line asks for; with `monitors = "finite"` the voltage's alone."""
+    """Make the clamps on what the loop asks for; with `monitors = "finite"` the voltage's alone."""
     limits, amplifier = rig.supervisor, rig.amplifier
     if limits.monitors != "all":
         return Limiter(voltage=amplifier.limit, period=rig.period, notify=notify)
@@ -203,7 +203,7 @@ def make_limiter(rig: Rig, notify: Callable[[Event], None]) -> Limiter:
     )
 
 
-def make_outliers(rig: Rig) -> OutlierFilter:
+def make_outlier_filter(rig: Rig) -> OutlierFilter:
     """Make what leaves wrong counts out; with `monitors = "finite"` it leaves none out."""
     limits = rig.supervisor
     fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf

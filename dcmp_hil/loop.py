@@ -38,32 +38,32 @@ class StopFlag(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LoopStages:
     """The stages of a cycle, in the order in which a sample passes them."""
 
     backend: Backend
-    outliers: OutlierFilter
+    outlier_filter: OutlierFilter
     observer: Observer
     predictor: Predictor
     trajectory: Trajectory
     controller: Controller
     supervisor: Supervisor
     telemetry: Telemetry
-    overruns: DeadlineMonitor
+    deadline_monitor: DeadlineMonitor
     clock: Clock
     delay: float  # s, from a sample to the instant at which its command acts
     changes: Changes = field(default_factory=NoChanges)
 
 
-def run(line: Line, until: float, stop: StopFlag) -> float:
+def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
     """Run cycles until device time reaches `until`, or the end is requested.
 
     The backend must be open, and its owner closes it: that drives 0 V however this function ends.
 
     Parameters
     ----------
-    line
-        The stages.
+    stages
+        The stages of a cycle.
     until
         s, device time; the period whose sample is at or after it is the last.
     stop
@@ -83,17 +83,20 @@ def run(line: Line, until: float, stop: StopFlag) -> float:
     BackendError
         If the device or the way to it fails.
     """
-    backend, outliers, trajectory, supervisor, clock, delay = (
-        line.backend, line.outliers, line.trajectory, line.supervisor, line.clock, line.delay,
+    backend, outlier_filter, observer, predictor = (
+        stages.backend, stages.outlier_filter, stages.observer, stages.predictor,
     )  # fmt: skip
-    observer, predictor, controller, telemetry, overruns, changes = (
-        line.observer, line.predictor, line.controller, line.telemetry, line.overruns, line.changes,
+    trajectory, controller, supervisor, telemetry = (
+        stages.trajectory, stages.controller, stages.supervisor, stages.telemetry,
+    )  # fmt: skip
+    deadline_monitor, clock, delay, changes = (
+        stages.deadline_monitor, stages.clock, stages.delay, stages.changes,
     )  # fmt: skip
     previous, first = math.nan, math.nan
 
     while True:
         sample = backend.read()
-        while outliers.reject(sample):  # as if it had been lost: the device holds its voltage
+        while outlier_filter.reject(sample):  # as if it had been lost: the device holds its voltage
             sample = backend.read()
         t = sample.t
         arrived = clock.now_ns() * 1e-9
@@ -115,7 +118,7 @@ def run(line: Line, until: float, stop: StopFlag) -> float:
         previous = arrived
         changes.apply(t)
 
-        over = supervisor.check(t, overruns.check(timing))
+        over = supervisor.check(t, deadline_monitor.check(timing))
         if over is not None:
             raise over.error()
         if (t >= until or stop.requested) and not supervisor.stopping:

@@ -120,7 +120,7 @@ class Session:
             )
         self._control = control
         mailbox = control.mailbox if control else None
-        self._line, self._recorder = assemble(
+        self._stages, self._recorder = assemble(
             rig,
             clock,
             here,
@@ -146,7 +146,7 @@ class Session:
         BackendError
             If the device or the way to it fails.
         """
-        line, recorder = self._line, self._recorder
+        stages, recorder = self._stages, self._recorder
         began_ns = self._wall.now_ns()
         end, why, reached, armed = ZERO, "", False, False
         try:
@@ -154,9 +154,9 @@ class Session:
             with self.stop, self._open_telemetry(), self._realtime or nullcontext():
                 self._say_where()
                 began_ns, reached = self._wall.now_ns(), True
-                with line.backend:
+                with stages.backend:
                     armed = True
-                    self._run_line()
+                    self._run_loop()
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
@@ -200,21 +200,21 @@ class Session:
 
     def _warn_live(self, sentence: str) -> None:
         """Ask the loop to report a warning; called from another thread."""
-        if isinstance(self._line.changes, LiveChanges):
-            self._line.changes.warn(sentence)
+        if isinstance(self._stages.changes, LiveChanges):
+            self._stages.changes.warn(sentence)
 
-    def _run_line(self) -> None:
-        line, recorder = self._line, self._recorder
-        device = getattr(line.backend, "described", "")
+    def _run_loop(self) -> None:
+        stages, recorder = self._stages, self._recorder
+        device = getattr(stages.backend, "described", "")
         if device:
             recorder.event(Event(0.0, "INFO", EventKind.DEVICE, f"device: {device}"))
-        for remark in getattr(line.backend, "remarks", ()):
+        for remark in getattr(stages.backend, "remarks", ()):
             recorder.event(Event(0.0, "WARN", EventKind.DEVICE, remark))
-        t = loop.run(line, self._length - 1.5 * self.rig.period, self.stop)
+        t = loop.run(stages, self._length - 1.5 * self.rig.period, self.stop)
         if self.rig.run.end == "lower" and not self.stop.requested:
             recorder.event(Event(t, "INFO", EventKind.LOWERING, "lowering the arm"))
-            line.trajectory.lower(t + line.delay)
-            loop.run(line, t + line.delay + LOWERING, self.stop)
+            stages.trajectory.lower(t + stages.delay)
+            loop.run(stages, t + stages.delay + LOWERING, self.stop)
 
     def _tell(self, level: Level, kind: EventKind, text: str, data: EventData | None = None) -> None:
         """Report an event at the device time of the last cycle."""
@@ -222,7 +222,7 @@ class Session:
 
     def _tell_how_device_ended(self) -> None:
         """Warn where the device stopped by a fault of its own at the end, and not because it was told to."""
-        ended = getattr(self._line.backend, "device_end", None)
+        ended = getattr(self._stages.backend, "device_end", None)
         if ended and ended.fault:
             sentence = (
                 f"the device ended the run by itself, in fault {ended.fault}: the last commands, 0 V and "
@@ -256,16 +256,16 @@ class Session:
             events=self._figures.events(),
             periods=self._recorder.written,
             dropped=self._apart.dropped if self._apart else self._recorder.dropped,
-            link=getattr(self._line.backend, "counters", None),
+            link=getattr(self._stages.backend, "counters", None),
             link_concerns=tuple(self._recorder.link.concerns.values()),
-            device_end=getattr(self._line.backend, "device_end", None),
+            device_end=getattr(self._stages.backend, "device_end", None),
             grants=tuple(self._realtime.grants) if self._realtime else (),
             host=self._host,
-            overruns=self._line.overruns.count,
-            outliers=self._line.outliers.count,
+            overruns=self._stages.deadline_monitor.count,
+            outliers=self._stages.outlier_filter.count,
             troubles=tuple(self._figures.troubles),
-            changes=tuple(getattr(self._line.changes, "made", ())),
-            motor_gain=self._line.supervisor.motor_gain,
+            changes=tuple(getattr(self._stages.changes, "made", ())),
+            motor_gain=self._stages.supervisor.motor_gain,
         )
 
 

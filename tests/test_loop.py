@@ -59,7 +59,7 @@ class _Stages:
             return 0.0
         return 6.0
 
-    def line(self) -> loop.Line:
+    def line(self) -> loop.LoopStages:
         """Make the line."""
         clock = self.clock
 
@@ -67,9 +67,9 @@ class _Stages:
             clock.sleep_until_ns(clock.now_ns() + 7_000)  # 7 us of work
             return 5.0
 
-        return loop.Line(
+        return loop.LoopStages(
             backend=self.stage({"read": self.read, "write": lambda _: None}),
-            outliers=OutlierFilter(math.inf, 1e-3, 0.0),
+            outlier_filter=OutlierFilter(math.inf, 1e-3, 0.0),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
             predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
             trajectory=self.stage(
@@ -85,7 +85,7 @@ class _Stages:
                 }
             ),
             telemetry=self.stage({"record": lambda _: None}),
-            overruns=DeadlineMonitor(1e-3),
+            deadline_monitor=DeadlineMonitor(1e-3),
             clock=clock,
             delay=0.001,
         )
@@ -98,7 +98,7 @@ class _Stop:
 _SAMPLES = [Sample(0.5 + 0.001 * k, 0.25, 1.0 * k) for k in range(10)]
 
 
-def _stages(trip_at: int = 10**9) -> tuple[_Stages, loop.Line]:
+def _stages(trip_at: int = 10**9) -> tuple[_Stages, loop.LoopStages]:
     stages = _Stages(SimulatedClock(), _SAMPLES)
     stages.trip_at = trip_at
     return stages, stages.line()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import dcmp_hil
-from dcmp_hil.assembly import make_limiter, make_outliers, make_supervisor
+from dcmp_hil.assembly import make_limiter, make_outlier_filter, make_supervisor
 from dcmp_hil.errors import DeadlineError, Explanation, TripError
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
@@ -37,7 +37,12 @@ class _Broken:
 
 def _checks() -> list[Check]:
     rig = bench()
-    made: list[Check] = [Finite(), Ranges(1.0, 1.0), make_outliers(rig), make_limiter(rig, lambda _: None)]
+    made: list[Check] = [
+        Finite(),
+        Ranges(1.0, 1.0),
+        make_outlier_filter(rig),
+        make_limiter(rig, lambda _: None),
+    ]
     return [*made, CheckedObserver(_Broken(), "a:B"), CheckedController(_Broken(), "a:B")]
 
 

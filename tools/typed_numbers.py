@@ -169,7 +169,7 @@ def judge(typed: Typed) -> Outcome:
 
 
 def _set_at(session: Session, mailbox: Mailbox, change: Change, at: float) -> None:
-    backend = session._line.backend  # noqa: SLF001 - the only place that knows device time
+    backend = session._stages.backend  # noqa: SLF001 - the only place that knows device time
     read = backend.read
 
     def reading() -> object:

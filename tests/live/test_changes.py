@@ -105,7 +105,7 @@ def _since_start(columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]
 def test_gains_are_the_new_ones_after_the_ramp() -> None:
     run = ChangedRun({_AT: ["controller.kp_1_s2=9000", "controller.kd_1_s=200"]})
     run.run()
-    line = run.held.session._line  # noqa: SLF001 - no public attribute shows it
+    line = run.held.session._stages  # noqa: SLF001 - no public attribute shows it
     assert line.controller.gains == (9000.0, 200.0, 1.0)  # type: ignore[attr-defined]
 
 
