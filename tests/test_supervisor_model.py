@@ -7,9 +7,9 @@ from itertools import product
 
 import pytest
 
-from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
 
-Table = dict[Phase, dict[Cue, Phase]]
+Table = dict[Phase, dict[PhaseEvent, Phase]]
 Path = tuple[Phase, ...]
 
 ORDER = [
@@ -18,7 +18,7 @@ ORDER = [
 
 
 def table() -> Table:
-    return {phase: dict(cues) for phase, cues in TABLE.items()}
+    return {phase: dict(events) for phase, events in TABLE.items()}
 
 
 def paths(of: Table) -> list[Path]:
@@ -45,12 +45,12 @@ def violations(of: Table) -> list[str]:
     wrong += [
         f"a fault does not lead from {phase} to TRIPPED"
         for phase in Phase
-        if phase is not Phase.TRIPPED and of[phase].get(Cue.FAULT) is not Phase.TRIPPED
+        if phase is not Phase.TRIPPED and of[phase].get(PhaseEvent.FAULT) is not Phase.TRIPPED
     ]
     wrong += [
         f"a concern does not end {phase}"
         for phase in ORDER[:-1]
-        if of[phase].get(Cue.CONCERN) not in (Phase.STOPPING, Phase.TRIPPED)
+        if of[phase].get(PhaseEvent.CONCERN) not in (Phase.STOPPING, Phase.TRIPPED)
     ]
     if set(of[Phase.STOPPING].values()) != {Phase.TRIPPED}:
         wrong.append("STOPPING leads elsewhere than to TRIPPED")
@@ -69,9 +69,9 @@ def violations(of: Table) -> list[str]:
     reached = {phase for path in every for phase in path}
     wrong += [f"{phase} is never reached" for phase in Phase if phase not in reached]
     wrong += [
-        f"{cue} leads from {phase}, and nothing else may lead to full authority"
-        for phase, cue in product(Phase, Cue)
-        if of[phase].get(cue) is Phase.RUNNING and cue is not Cue.ENGAGED
+        f"{event} leads from {phase}, and nothing else may lead to full authority"
+        for phase, event in product(Phase, PhaseEvent)
+        if of[phase].get(event) is Phase.RUNNING and event is not PhaseEvent.ENGAGED
     ]
     return wrong
 
@@ -81,28 +81,28 @@ def test_table_holds_what_it_must() -> None:
 
 
 SEEDED = {
-    "out of TRIPPED": (Phase.TRIPPED, Cue.ARMED, Phase.PROBING),
-    "straight to RUNNING": (Phase.ARMING, Cue.ARMED_UNPROBED, Phase.RUNNING),
-    "no settling after the probe": (Phase.PROBING, Cue.PROBED, Phase.ENGAGING),
-    "no ramp": (Phase.SETTLING, Cue.SETTLED, Phase.RUNNING),
-    "a fault that only starts again": (Phase.ENGAGING, Cue.FAULT, Phase.SETTLING),
-    "back to the probe": (Phase.RUNNING, Cue.SETTLED, Phase.PROBING),
-    "a concern that is forgotten": (Phase.STOPPING, Cue.STOPPED, Phase.RUNNING),
-    "a concern that only starts again": (Phase.ENGAGING, Cue.CONCERN, Phase.SETTLING),
-    "an orderly end without authority": (Phase.PROBING, Cue.CONCERN, Phase.STOPPING),
+    "out of TRIPPED": (Phase.TRIPPED, PhaseEvent.ARMED, Phase.PROBING),
+    "straight to RUNNING": (Phase.ARMING, PhaseEvent.ARMED_UNPROBED, Phase.RUNNING),
+    "no settling after the probe": (Phase.PROBING, PhaseEvent.PROBED, Phase.ENGAGING),
+    "no ramp": (Phase.SETTLING, PhaseEvent.SETTLED, Phase.RUNNING),
+    "a fault that only starts again": (Phase.ENGAGING, PhaseEvent.FAULT, Phase.SETTLING),
+    "back to the probe": (Phase.RUNNING, PhaseEvent.SETTLED, Phase.PROBING),
+    "a concern that is forgotten": (Phase.STOPPING, PhaseEvent.STOPPED, Phase.RUNNING),
+    "a concern that only starts again": (Phase.ENGAGING, PhaseEvent.CONCERN, Phase.SETTLING),
+    "an orderly end without authority": (Phase.PROBING, PhaseEvent.CONCERN, Phase.STOPPING),
 }
 
 
 @pytest.mark.parametrize("error", SEEDED, ids=str)
 def test_search_finds_a_seeded_error(error: str) -> None:
-    phase, cue, following = SEEDED[error]
+    phase, event, following = SEEDED[error]
     changed = copy.deepcopy(table())
-    changed[phase][cue] = following
+    changed[phase][event] = following
     assert violations(changed)
 
 
 @pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.TRIPPED])
 def test_search_finds_a_fault_that_leads_nowhere(phase: Phase) -> None:
     changed = table()
-    del changed[phase][Cue.FAULT]
+    del changed[phase][PhaseEvent.FAULT]
     assert violations(changed)

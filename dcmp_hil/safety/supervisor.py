@@ -30,7 +30,7 @@ class Phase(StrEnum):
     TRIPPED = "tripped"  # 0 V for good
 
 
-class Cue(Enum):
+class PhaseEvent(Enum):
     """Conditions that lead from one phase of a run to the next."""
 
     ARMED = auto()  # the first sample, and a probe is wanted
@@ -43,21 +43,33 @@ class Cue(Enum):
     STOPPED = auto()
 
 
-TABLE: Mapping[Phase, Mapping[Cue, Phase]] = {
+TABLE: Mapping[Phase, Mapping[PhaseEvent, Phase]] = {
     Phase.ARMING: {
-        Cue.ARMED: Phase.PROBING,
-        Cue.ARMED_UNPROBED: Phase.SETTLING,
-        Cue.CONCERN: Phase.TRIPPED,
-        Cue.FAULT: Phase.TRIPPED,
+        PhaseEvent.ARMED: Phase.PROBING,
+        PhaseEvent.ARMED_UNPROBED: Phase.SETTLING,
+        PhaseEvent.CONCERN: Phase.TRIPPED,
+        PhaseEvent.FAULT: Phase.TRIPPED,
     },
-    Phase.PROBING: {Cue.PROBED: Phase.SETTLING, Cue.CONCERN: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
-    Phase.SETTLING: {Cue.SETTLED: Phase.ENGAGING, Cue.CONCERN: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
-    Phase.ENGAGING: {Cue.ENGAGED: Phase.RUNNING, Cue.CONCERN: Phase.STOPPING, Cue.FAULT: Phase.TRIPPED},
-    Phase.RUNNING: {Cue.CONCERN: Phase.STOPPING, Cue.FAULT: Phase.TRIPPED},
-    Phase.STOPPING: {Cue.STOPPED: Phase.TRIPPED, Cue.FAULT: Phase.TRIPPED},
+    Phase.PROBING: {
+        PhaseEvent.PROBED: Phase.SETTLING,
+        PhaseEvent.CONCERN: Phase.TRIPPED,
+        PhaseEvent.FAULT: Phase.TRIPPED,
+    },
+    Phase.SETTLING: {
+        PhaseEvent.SETTLED: Phase.ENGAGING,
+        PhaseEvent.CONCERN: Phase.TRIPPED,
+        PhaseEvent.FAULT: Phase.TRIPPED,
+    },
+    Phase.ENGAGING: {
+        PhaseEvent.ENGAGED: Phase.RUNNING,
+        PhaseEvent.CONCERN: Phase.STOPPING,
+        PhaseEvent.FAULT: Phase.TRIPPED,
+    },
+    Phase.RUNNING: {PhaseEvent.CONCERN: Phase.STOPPING, PhaseEvent.FAULT: Phase.TRIPPED},
+    Phase.STOPPING: {PhaseEvent.STOPPED: Phase.TRIPPED, PhaseEvent.FAULT: Phase.TRIPPED},
     Phase.TRIPPED: {},
 }
-"""What follows what; a cue that is not listed changes nothing. Nothing leads out of TRIPPED."""
+"""What follows what; an event that is not listed changes nothing. Nothing leads out of TRIPPED."""
 
 _RAMP_TIME_S = 0.05  # s that an orderly end takes to 0 V
 
@@ -128,11 +140,11 @@ class Supervisor:
         if self._has_authority:
             return False
         if self.phase is Phase.ARMING:
-            self._cue(Cue.ARMED if self._probe else Cue.ARMED_UNPROBED, sample.t)
+            self._advance(PhaseEvent.ARMED if self._probe else PhaseEvent.ARMED_UNPROBED, sample.t)
         if self.phase is Phase.PROBING:
             self._go_on_probing(sample)
         if self.phase is Phase.SETTLING and sample.t - self._since >= self._settle:
-            self._cue(Cue.SETTLED, sample.t)
+            self._advance(PhaseEvent.SETTLED, sample.t)
             return True
         return False
 
@@ -180,7 +192,7 @@ class Supervisor:
     def stop(self, cause: TripRequest, t: float) -> None:
         """Begin to end the run in the period of device time `t` (s); the first cause wins."""
         self._cause = self._cause or cause
-        self._cue(Cue.FAULT if cause.urgency is Urgency.NOW else Cue.CONCERN, t)
+        self._advance(PhaseEvent.FAULT if cause.urgency is Urgency.NOW else PhaseEvent.CONCERN, t)
 
     def _go_on_probing(self, sample: Sample) -> None:
         assert self._probe is not None  # noqa: S101 - the table leads here only with one
@@ -190,7 +202,7 @@ class Supervisor:
                 refusal  # behind what the checks find in this cycle: a jump is no motion of the arm
             )
         elif self._probe.over:
-            self._cue(Cue.PROBED, sample.t)
+            self._advance(PhaseEvent.PROBED, sample.t)
         else:
             most = self.limits.voltage_limit
             self._push = max(-most, min(most, self._probe.voltage))
@@ -201,9 +213,9 @@ class Supervisor:
             self.stop(self._refusal, t)
         gone = t - self._since
         if self.phase is Phase.ENGAGING and not gone < self._engage:
-            self._cue(Cue.ENGAGED, t)
+            self._advance(PhaseEvent.ENGAGED, t)
         elif self.phase is Phase.STOPPING and not gone < _RAMP_TIME_S:
-            self._cue(Cue.STOPPED, t)
+            self._advance(PhaseEvent.STOPPED, t)
 
     def _partial_voltage(self, t: float, demand: float) -> float:
         """Return the voltage in every phase but RUNNING, V."""
@@ -218,15 +230,15 @@ class Supervisor:
             return 0.0
         return self.limits.limit_slew(max(-most, min(most, demand)), self._last)
 
-    def _cue(self, cue: Cue, t: float) -> None:
-        following = TABLE[self.phase].get(cue)
+    def _advance(self, event: PhaseEvent, t: float) -> None:
+        following = TABLE[self.phase].get(event)
         if following is None:
             return
         self.phase, self._since = following, t
         self._has_authority = following is Phase.RUNNING
         self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
         if following is Phase.TRIPPED and self._cause is not None:
-            self._over = self._cause._replace(orderly=cue is Cue.STOPPED)
+            self._over = self._cause._replace(orderly=event is PhaseEvent.STOPPED)
         self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
 from tests.stateful.device_model import Command, Device, Rules, State
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Model:
     def __init__(
         self,
         rules: Rules = SMALL,
-        table: Mapping[Phase, Mapping[Cue, Phase]] = TABLE,
+        table: Mapping[Phase, Mapping[PhaseEvent, Phase]] = TABLE,
         *,
         deaf: bool = False,
     ) -> None:
@@ -119,11 +119,11 @@ class Model:
     def _supervised(self, phase: Phase, told: State) -> Iterator[tuple[str, Command]]:
         if phase is Phase.TRIPPED:
             yield BYE, Command(OURS, flag="")
-        cues = self.table[phase]
-        if told != State.RUN and not self._deaf and Cue.FAULT in cues:
-            phases = [cues[Cue.FAULT]]
+        events = self.table[phase]
+        if told != State.RUN and not self._deaf and PhaseEvent.FAULT in events:
+            phases = [events[PhaseEvent.FAULT]]
         else:
-            phases = [phase, *dict.fromkeys(cues.values())]
+            phases = [phase, *dict.fromkeys(events.values())]
         for following in phases:
             for volts in (False, True) if following in _POWERED else (False,):
                 yield following, Command(OURS, volts=volts)

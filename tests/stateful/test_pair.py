@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.safety.supervisor import TABLE, Cue, Phase
+from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
 from tests.stateful.device_model import NEXT, Command, Device, Rules, State
 from tests.stateful.pair import SMALL, Model, search, stuck
 
@@ -69,9 +69,9 @@ class NoEdge(Rules):
         return super().classify(device._replace(lowered=True), command, close=close)
 
 
-def _host(phase: Phase, cue: Cue, following: Phase) -> Mapping[Phase, Mapping[Cue, Phase]]:
-    changed = {here: dict(cues) for here, cues in TABLE.items()}
-    changed[phase][cue] = following
+def _host(phase: Phase, event: PhaseEvent, following: Phase) -> Mapping[Phase, Mapping[PhaseEvent, Phase]]:
+    changed = {here: dict(events) for here, events in TABLE.items()}
+    changed[phase][event] = following
     return changed
 
 
@@ -87,9 +87,9 @@ SEEDED = {
     "the voltage stays": Model(KeepsVoltage(*SIZES)),
     "clear without its edge": Model(NoEdge(*SIZES)),
     "the host is deaf": Model(deaf=True),
-    "TRIPPED is left": Model(table=_host(Phase.TRIPPED, Cue.ARMED, Phase.PROBING)),
-    "a fault only starts again": Model(table=_host(Phase.RUNNING, Cue.FAULT, Phase.SETTLING)),
-    "an orderly end that is forgotten": Model(table=_host(Phase.STOPPING, Cue.STOPPED, Phase.RUNNING)),
+    "TRIPPED is left": Model(table=_host(Phase.TRIPPED, PhaseEvent.ARMED, Phase.PROBING)),
+    "a fault only starts again": Model(table=_host(Phase.RUNNING, PhaseEvent.FAULT, Phase.SETTLING)),
+    "an orderly end that is forgotten": Model(table=_host(Phase.STOPPING, PhaseEvent.STOPPED, Phase.RUNNING)),
 }
 
 
@@ -102,7 +102,7 @@ def test_search_finds_a_seeded_error(error: str) -> None:
 STUCK = {
     "a fault is for ever": Model(Rules(*SIZES, _with("clear", State.FAULT, State.FAULT))),
     "it never arms": Model(Rules(*SIZES, _with("arm last", State.ARMING, State.ARMING))),
-    "it never settles": Model(table=_host(Phase.SETTLING, Cue.SETTLED, Phase.SETTLING)),
+    "it never settles": Model(table=_host(Phase.SETTLING, PhaseEvent.SETTLED, Phase.SETTLING)),
 }
 
 

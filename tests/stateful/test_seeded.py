@@ -13,7 +13,7 @@ from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.disarm import Disarm
 from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import Finite
-from dcmp_hil.safety.supervisor import TABLE, Cue, Phase, Supervisor
+from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent, Supervisor
 from dcmp_hil.values import Fault
 from sim_backend.board import build, hostlib
 from tests.stateful.machine import Machine
@@ -33,9 +33,9 @@ Patch = pytest.MonkeyPatch
 pytestmark = pytest.mark.usefixtures("untraced")
 
 
-def _table(phase: Phase, cue: Cue, following: Phase) -> Callable[[Patch], None]:
-    changed = {here: dict(cues) for here, cues in TABLE.items()}
-    changed[phase][cue] = following
+def _table(phase: Phase, event: PhaseEvent, following: Phase) -> Callable[[Patch], None]:
+    changed = {here: dict(events) for here, events in TABLE.items()}
+    changed[phase][event] = following
     return lambda patch: patch.setattr("dcmp_hil.safety.supervisor.TABLE", changed)
 
 
@@ -52,10 +52,10 @@ def _safe_voltage_nan(supervisor: Supervisor, sample: Sample, estimate: Estimate
 
 IN_HOST = {
     "a device's fault is overlooked": _method(Finite, "check", lambda *_: None),
-    "a trip is not for good": _table(Phase.TRIPPED, Cue.FAULT, Phase.SETTLING),
-    "a fault goes back to settling": _table(Phase.RUNNING, Cue.FAULT, Phase.SETTLING),
-    "an orderly end that never ends": _table(Phase.STOPPING, Cue.STOPPED, Phase.STOPPING),
-    "an orderly end with full authority": _table(Phase.STOPPING, Cue.STOPPED, Phase.RUNNING),
+    "a trip is not for good": _table(Phase.TRIPPED, PhaseEvent.FAULT, Phase.SETTLING),
+    "a fault goes back to settling": _table(Phase.RUNNING, PhaseEvent.FAULT, Phase.SETTLING),
+    "an orderly end that never ends": _table(Phase.STOPPING, PhaseEvent.STOPPED, Phase.STOPPING),
+    "an orderly end with full authority": _table(Phase.STOPPING, PhaseEvent.STOPPED, Phase.RUNNING),
     "no ramp": _method(Supervisor, "_partial_voltage", lambda _, __, demand: demand),
     "no clamp": _method(Limiter, "limit_voltage", lambda _, __, demand, ___: demand),
     "NaN is let through": _method(Supervisor, "safe_voltage", _safe_voltage_nan),
