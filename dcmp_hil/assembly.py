@@ -23,7 +23,7 @@ from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.limiter import Limiter
-from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
+from dcmp_hil.safety.monitors import DisturbanceWatch, FiniteMonitor, RangeMonitor
 from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.safety.polarity_check import probe_for
 from dcmp_hil.safety.speed_resolution import resolution
@@ -150,17 +150,17 @@ def make_supervisor(
     chatter = chatter or make_chatter(rig)
     limits = rig.supervisor
     clamps = make_limiter(rig, notify)
-    checks: list[Check] = [*first, Finite()]
+    checks: list[Check] = [*first, FiniteMonitor()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
         position, velocity = limits.position_limit_rad, limits.velocity_limit_rad_s
         spare = resolution(rig.encoder.count, rig.period)
-        independent = Ranges(position, velocity, spare, "the supervisor's own observer")
+        independent = RangeMonitor(position, velocity, spare, "the supervisor's own observer")
         second = DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent)
         chatter.samples = second.samples
         clamps.watch_variation(chatter)
-        checks += [Ranges(position, velocity, spare), second]
+        checks += [RangeMonitor(position, velocity, spare), second]
     immediate = limits.start == "immediate"
     probe = (
         None

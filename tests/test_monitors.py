@@ -9,7 +9,7 @@ import pytest
 
 from dcmp_hil.assembly import make_supervisor
 from dcmp_hil.errors import TripError
-from dcmp_hil.safety.monitors import DisturbanceWatch, Finite, Ranges
+from dcmp_hil.safety.monitors import DisturbanceWatch, FiniteMonitor, RangeMonitor
 from dcmp_hil.values import Estimate, Fault, Sample
 from tests.helpers import T, bench, setting, spoilt
 
@@ -42,34 +42,34 @@ class _Finds:
 
 
 def test_finite_lets_a_healthy_period_pass() -> None:
-    assert _reason(Finite()) == ""
+    assert _reason(FiniteMonitor()) == ""
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
 @pytest.mark.parametrize("field", ["t", "position", "voltage"])
 def test_finite_objects_when_a_number_of_the_sample_is_not_finite(field: str, bad: float) -> None:
-    assert _reason(Finite(), sample=spoilt(_SAMPLE, field, bad)) == "not_finite"
+    assert _reason(FiniteMonitor(), sample=spoilt(_SAMPLE, field, bad)) == "not_finite"
 
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
 @pytest.mark.parametrize("field", Estimate._fields)
 def test_finite_objects_when_a_number_of_the_estimate_is_not_finite(field: str, bad: float) -> None:
-    assert _reason(Finite(), estimate=_ESTIMATE._replace(**{field: bad})) == "not_finite"
+    assert _reason(FiniteMonitor(), estimate=_ESTIMATE._replace(**{field: bad})) == "not_finite"
 
 
 def test_finite_objects_when_infinities_would_cancel() -> None:
     both = Estimate(math.inf, -math.inf, 0.0)
-    assert _reason(Finite(), estimate=both) == "not_finite"
+    assert _reason(FiniteMonitor(), estimate=both) == "not_finite"
 
 
 @pytest.mark.parametrize("code", [Fault.UNKNOWN, 1, 77])
 def test_finite_objects_when_the_device_reports_a_fault(code: int) -> None:
-    assert _reason(Finite(), sample=_SAMPLE._replace(fault=code)) == "device_fault"
+    assert _reason(FiniteMonitor(), sample=_SAMPLE._replace(fault=code)) == "device_fault"
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_ranges_object_just_beyond_the_limit_and_not_on_it(sign: float) -> None:
-    ranges = Ranges(position=6.0, velocity=20.0)
+    ranges = RangeMonitor(position=6.0, velocity=20.0)
     beyond = math.nextafter
     assert _reason(ranges, sample=_SAMPLE._replace(position=sign * 6.0)) == ""
     assert _reason(ranges, sample=_SAMPLE._replace(position=beyond(sign * 6.0, sign * 9))) == "travel"
@@ -78,14 +78,14 @@ def test_ranges_object_just_beyond_the_limit_and_not_on_it(sign: float) -> None:
 
 
 def test_ranges_leave_an_estimate_what_the_encoder_shows_too_much() -> None:
-    ranges = Ranges(position=6.0, velocity=2.0, spare=0.25)
+    ranges = RangeMonitor(position=6.0, velocity=2.0, spare=0.25)
     for velocity, reason in ((2.25, ""), (-2.25, ""), (2.26, "speed"), (-2.26, "speed")):
         assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=velocity)) == reason
 
 
 def test_limits_are_judged_by_the_watch_and_not_by_the_run_s_observer() -> None:
     observer = _Finds(0.0)
-    watch = DisturbanceWatch(observer, setting(), 50.0, ranges=Ranges(6.0, 2.0, seen_by="the watch"))
+    watch = DisturbanceWatch(observer, setting(), 50.0, ranges=RangeMonitor(6.0, 2.0, seen_by="the watch"))
     assert _reason(watch, estimate=Estimate(0.0, 99.0, 0.0)) == ""
     observer.velocity = -2.1
     assert _reason(watch, estimate=Estimate(0.0, 0.0, 0.0)) == "speed"
@@ -95,7 +95,7 @@ def test_limits_are_judged_by_the_watch_and_not_by_the_run_s_observer() -> None:
 
 @pytest.mark.parametrize("bad", _NOT_FINITE)
 def test_ranges_object_when_what_they_watch_is_not_finite(bad: float) -> None:
-    ranges = Ranges(position=6.0, velocity=20.0)
+    ranges = RangeMonitor(position=6.0, velocity=20.0)
     assert _reason(ranges, sample=_SAMPLE._replace(position=bad)) == "travel"
     assert _reason(ranges, estimate=_ESTIMATE._replace(velocity=bad)) == "speed"
 

@@ -15,7 +15,7 @@ from dcmp_hil.assembly import make_limiter, make_outlier_filter, make_supervisor
 from dcmp_hil.errors import DeadlineError, Explanation, TripError
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
-from dcmp_hil.safety.monitors import Finite, Ranges
+from dcmp_hil.safety.monitors import FiniteMonitor, RangeMonitor
 from dcmp_hil.safety.polarity_check import PolarityCheck
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.trip_request import TripRequest, Urgency
@@ -38,8 +38,8 @@ class _Broken:
 def _checks() -> list[Check]:
     rig = bench()
     made: list[Check] = [
-        Finite(),
-        Ranges(1.0, 1.0),
+        FiniteMonitor(),
+        RangeMonitor(1.0, 1.0),
         make_outlier_filter(rig),
         make_limiter(rig, lambda _: None),
     ]

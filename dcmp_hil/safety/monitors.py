@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _HEALTHY = Fault.NONE  # found here faster than in its class
 
 
-class Finite:
+class FiniteMonitor:
     """Every number of sample and estimate is finite, and the device is healthy: needed on every rig."""
 
     def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
@@ -41,7 +41,7 @@ class Finite:
         return None
 
 
-class Ranges:
+class RangeMonitor:
     """Position and velocity stay inside their limits.
 
     Parameters
@@ -109,7 +109,7 @@ class DisturbanceWatch:
         setting: ObserverContext,
         limit: float,
         for_: float = 5e-3,
-        ranges: Ranges | None = None,
+        ranges: RangeMonitor | None = None,
     ) -> None:
         self._ranges = ranges
         self._diagnosis = Diagnosis(setting)

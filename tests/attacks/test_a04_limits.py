@@ -20,7 +20,7 @@ import pytest
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.safety.monitors import Ranges
+from dcmp_hil.safety.monitors import RangeMonitor
 from dcmp_hil.values import Estimate, Sample
 from dcmp_hil.wire.codec import pack, unpack
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterValue
@@ -148,7 +148,7 @@ _LIMITS = (
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_speed_that_is_no_number_is_no_speed(bad: float) -> None:
-    ranges = Ranges(6.0, 2.0, 0.2)
+    ranges = RangeMonitor(6.0, 2.0, 0.2)
     stop = ranges.check(Sample(0.0, 0.0, 0.0), Estimate(0.0, bad, 0.0))
     assert stop is not None
     assert stop.reason == "speed"

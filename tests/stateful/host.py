@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.safety.limiter import Limiter
-from dcmp_hil.safety.monitors import Finite
+from dcmp_hil.safety.monitors import FiniteMonitor
 from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Event, Fault, PhaseData, Sample
@@ -38,7 +38,7 @@ class Host:
         self.backend, self.judge, self.session = backend, judge, session
         self.objector = Objector()
         limits = Limiter(voltage=MOST, period=PERIOD, notify=self._notified)
-        monitors = (Finite(), self.objector)
+        monitors = (FiniteMonitor(), self.objector)
         self.supervisor = Supervisor(monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified)
         self.sample = Sample(-math.inf, 0.0, 0.0)
         self._phase, self._since = Phase.ARMING, 0.0

@@ -12,7 +12,7 @@ from hypothesis.stateful import run_state_machine_as_test
 from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.disarm import Disarm
 from dcmp_hil.safety.limiter import Limiter
-from dcmp_hil.safety.monitors import Finite
+from dcmp_hil.safety.monitors import FiniteMonitor
 from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent, Supervisor
 from dcmp_hil.values import Fault
 from sim_backend.board import build, hostlib
@@ -51,7 +51,7 @@ def _safe_voltage_nan(supervisor: Supervisor, sample: Sample, estimate: Estimate
 
 
 IN_HOST = {
-    "a device's fault is overlooked": _method(Finite, "check", lambda *_: None),
+    "a device's fault is overlooked": _method(FiniteMonitor, "check", lambda *_: None),
     "a trip is not for good": _table(Phase.TRIPPED, PhaseEvent.FAULT, Phase.SETTLING),
     "a fault goes back to settling": _table(Phase.RUNNING, PhaseEvent.FAULT, Phase.SETTLING),
     "an orderly end that never ends": _table(Phase.STOPPING, PhaseEvent.STOPPED, Phase.STOPPING),
