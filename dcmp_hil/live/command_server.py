@@ -19,7 +19,7 @@ from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
 from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
-from dcmp_hil.live.connection_limits import BETWEEN, PATIENCE, Crowd, listen
+from dcmp_hil.live.connection_limits import BETWEEN, PATIENCE, ConnectionPool, listen
 from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.run_watch import RunWatch
 from dcmp_hil.live.state import state_of
@@ -89,7 +89,7 @@ class Server:
         self._unanswered = 0  # who asked for STOP and has no answer yet
         self._watchers: set[asyncio.StreamWriter] = set()
         self._over = False  # the last words are sent
-        self._crowd = Crowd()
+        self._connections = ConnectionPool()
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Answer the requests of one client until it disconnects."""
@@ -97,7 +97,7 @@ class Server:
         try:
             if peer_of(connection)[1] != os.getuid():
                 return
-            self._crowd.admit(writer)
+            self._connections.admit(writer)
             while line := await asyncio.wait_for(reader.readline(), PATIENCE):
                 await self._answer(json.loads(line), writer)
                 await asyncio.sleep(BETWEEN)
@@ -109,7 +109,7 @@ class Server:
         ):  # gone, no line of JSON, or the run's end, which CPython 3.11 would print as an error
             pass
         finally:
-            self._crowd.forget(writer)
+            self._connections.forget(writer)
             self._watchers.discard(writer)
             writer.close()
 
@@ -119,7 +119,7 @@ class Server:
             self._watchers.add(writer)
             await self._watch(writer)
         elif do == "stop":
-            self._crowd.forget(writer)  # it stays until it is answered
+            self._connections.forget(writer)  # it stays until it is answered
             await self._answer_stop(writer)
         elif do == "set":
             async with self._one_at_a_time:

@@ -22,7 +22,7 @@ _AT_ONCE = 32  # connections taken from the kernel: fewer than may wait, so that
 _ACCEPT_QUEUE_MAX = 1024  # connections that the kernel keeps meanwhile
 
 
-class Crowd:
+class ConnectionPool:
     """The connections there are, oldest first."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ _POLICY = (
 )
 
 
-class Guard:
+class AccessControl:
     """Checks host, origin and token of every request, and says in every answer what the page may load.
 
     Parameters

@@ -29,7 +29,7 @@ _REQUESTS_WITH_TOKEN_1_S = 300.0  # requests a second
 _STOP_PATH = b"/stop"
 
 
-class Bucket:
+class TokenBucket:
     """So many a second, and as many at once.
 
     Parameters
@@ -54,7 +54,7 @@ class Bucket:
         return True
 
 
-class Door:
+class ConnectionLimiter:
     """Makes the protocol of each connection.
 
     Parameters
@@ -70,7 +70,10 @@ class Door:
         self._token = token.encode()
         self._waiting: dict[Visit, None] = {}
         self._served: dict[Visit, None] = {}
-        self._strangers, self._friends = Bucket(_REQUESTS_WITHOUT_TOKEN_1_S), Bucket(_REQUESTS_WITH_TOKEN_1_S)
+        self._strangers, self._friends = (
+            TokenBucket(_REQUESTS_WITHOUT_TOKEN_1_S),
+            TokenBucket(_REQUESTS_WITH_TOKEN_1_S),
+        )
 
     def __call__(self) -> Visit:
         """Make the protocol of a new connection."""
@@ -115,10 +118,10 @@ class Visit(asyncio.Protocol):
         Whether it brought a STOP with the token.
     """
 
-    def __init__(self, door: Door) -> None:
+    def __init__(self, limiter: ConnectionLimiter) -> None:
         self.arrived_ns = MonotonicClock().now_ns()
         self.is_stop = False
-        self._door = door
+        self._limiter = limiter
         self._data = bytearray()
         self._refused = False
         self._head: Head | None = None
@@ -133,7 +136,7 @@ class Visit(asyncio.Protocol):
         self._late = asyncio.get_running_loop().call_later(
             _REQUEST_TIMEOUT_S, self._refuse, HTTPStatus.REQUEST_TIMEOUT
         )
-        self._door.admit(self)
+        self._limiter.admit(self)
 
     def data_received(self, data: bytes) -> None:
         """Collect the bytes of a request; bytes behind it are not read."""
@@ -165,8 +168,8 @@ class Visit(asyncio.Protocol):
             self._answering.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell the door that the connection is closed."""
-        self._door.forget(self)
+        """Tell the limiter that the connection is closed."""
+        self._limiter.forget(self)
         self._transport = None
         self._settled()
         if self._answering is not None:
@@ -174,7 +177,7 @@ class Visit(asyncio.Protocol):
 
     def drop(self) -> None:
         """Close at once."""
-        self._door.forget(self)
+        self._limiter.forget(self)
         self._settled()
         if self._transport is not None:
             self._transport.abort()
@@ -182,13 +185,13 @@ class Visit(asyncio.Protocol):
     def _serve(self, head: Head) -> None:
         assert self._transport is not None  # noqa: S101 - `data_received` looked
         request = head.alone() + bytes(self._data[head.size : head.size + head.length])
-        status = self._door.refusal(self, head, request)
+        status = self._limiter.refusal(self, head, request)
         if status:
             self._refuse(status)
             return
         self._settled()
         self._data.clear()
-        self._answering = self._door.make()
+        self._answering = self._limiter.make()
         self._answering.connection_made(self._transport)
         self._answering.data_received(request)
 

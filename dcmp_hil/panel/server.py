@@ -1,6 +1,6 @@
 """The page's server: on 127.0.0.1 only, a stream of states one way, changes and STOP the other.
 
-What reaches it came through `Door`: whole requests, few at a time.
+What reaches it came through `ConnectionLimiter`: whole requests, few at a time.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from aiohttp import web
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
 from dcmp_hil.live.stop_command import End
-from dcmp_hil.panel.access_control import Guard
-from dcmp_hil.panel.admission import BACKLOG, Door, Visit
+from dcmp_hil.panel.access_control import AccessControl
+from dcmp_hil.panel.admission import BACKLOG, ConnectionLimiter, Visit
 from dcmp_hil.panel.log_filter import quiet
 from dcmp_hil.panel.request_head import BODY_BYTES
 from dcmp_hil.panel.run_follower import Watcher
@@ -50,7 +50,7 @@ class Panel:
     """
 
     def __init__(self, port: int, pid: int | None = None, viewer: str = "") -> None:
-        self.guard = Guard(port, viewer)
+        self.access = AccessControl(port, viewer)
         self._port, self._viewer = port, viewer
         self._watcher = Watcher(pid)
         self._stopping = ThreadPoolExecutor(2)  # STOP queues behind nothing
@@ -64,10 +64,10 @@ class Panel:
 
         @web.middleware
         async def check(request: web.Request, handler: Any) -> web.StreamResponse:
-            return await self.guard.check(request, handler)
+            return await self.access.check(request, handler)
 
         app = web.Application(middlewares=[check], client_max_size=BODY_BYTES)
-        app.on_response_prepare.append(self.guard.add_headers)
+        app.on_response_prepare.append(self.access.add_headers)
         app.cleanup_ctx.append(self._watching)
         app.on_shutdown.append(self._end)
         app.add_routes([web.get(path, self._file) for path in _FILES])
@@ -87,14 +87,14 @@ class Panel:
         await runner.setup()
         assert runner.server is not None  # noqa: S101 - `setup` made it
         loop = asyncio.get_running_loop()
-        door = Door(runner.server, self.guard.token)
+        limiter = ConnectionLimiter(runner.server, self.access.token)
         server = None
         with quiet(loop):
             try:
-                server = await loop.create_server(door, "127.0.0.1", self._port, backlog=BACKLOG)
+                server = await loop.create_server(limiter, "127.0.0.1", self._port, backlog=BACKLOG)
                 for listening in server.sockets:
                     _keep_more_waiting(listening)
-                ready(self.guard.address)
+                ready(self.access.address)
                 await asyncio.Event().wait()
             except OSError as error:
                 raise ConfigError(
