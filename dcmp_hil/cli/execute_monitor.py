@@ -64,7 +64,7 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
     """Print messages for `duration` (s, 0 for ever) or until the user ends it; return the exit code."""
     clock = MonotonicClock()
     link = make_listening_link(rig.backend, clock)
-    caller, brief, ticks = DeviceClient(link, clock, 0), _Brief(), _Ticks()
+    client, brief, ticks = DeviceClient(link, clock, 0), _Brief(), _Ticks()
     heard = 0
     try:
         link.open()
@@ -73,7 +73,7 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
         until_ns = began_ns + 1e9 * duration if duration else math.inf
         with StopRequest() as stop:
             while not (stop.requested or output_failed()) and (now_ns := clock.now_ns()) < until_ns:
-                found = caller.overhear(_POLL_PERIOD_S)
+                found = client.receive_any(_POLL_PERIOD_S)
                 if found is None:
                     continue
                 heard += 1
@@ -83,7 +83,7 @@ def watch(rig: Rig, duration: float, *, all_frames: bool) -> int:
         hint = "" if heard else link.other_carrier
     finally:
         link.close()
-    damaged = link.corrupt + caller.corrupt
+    damaged = link.corrupt + client.corrupt
     console.note(f"{heard} messages, {damaged} damaged frames")
     if hint:
         console.warn(f"{link.name}: a device speaks there on another carrier. Say {hint}.")

@@ -93,8 +93,8 @@ class DeviceBackend:
         """
         self._link.open()
         try:
-            caller = DeviceClient(self._link, self._clock, self._node)
-            greeting = Handshake(self._link, caller, self._terms, self._clock, clear=self.clear).run()
+            client = DeviceClient(self._link, self._clock, self._node)
+            greeting = Handshake(self._link, client, self._terms, self._clock, clear=self.clear).run()
         except BaseException:
             self._link.close()
             raise
@@ -104,7 +104,7 @@ class DeviceBackend:
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
         self._heard_ns = self._clock.now_ns()
-        self._meter.start(greeting.tick, self._heard_ns, caller.health)
+        self._meter.start(greeting.tick, self._heard_ns, client.health)
         self._open = True
         return self
 
@@ -284,16 +284,16 @@ class DeviceBackend:
 
     def _leave(self, error: BaseException | None) -> None:
         """Disarm the device; STOP comes first after a trip, alone after its error, last without an answer."""
-        caller = DeviceClient(self._link, self._clock, self._node, self._tick)
+        client = DeviceClient(self._link, self._clock, self._node, self._tick)
         if isinstance(error, BackendError):
             if not self._forgotten:
-                caller.say(Stop(StopReason.NO_SAMPLE))
+                client.send(Stop(StopReason.NO_SAMPLE))
             return
         if isinstance(error, TripError) and not error.orderly:
-            caller.say(Stop(StopReason.SUPERVISOR))
-        goodbye = Disarm(caller, self._clock, self._session, self._ttl_ms)
+            client.send(Stop(StopReason.SUPERVISOR))
+        goodbye = Disarm(client, self._clock, self._session, self._ttl_ms)
         self.device_end = goodbye.run(answered=self._answered == self._tick)
-        self._meter.take_health(caller.health)
+        self._meter.take_health(client.health)
         if self.device_end is None:
-            caller.say(Stop(StopReason.NO_SAMPLE))
+            client.send(Stop(StopReason.NO_SAMPLE))
             raise open_errors.not_confirmed(self._link.name, self._ttl_ms)

@@ -57,11 +57,11 @@ class History(NamedTuple):
         return _CAUSES[self.cause] if 0 <= self.cause < len(_CAUSES) else f"cause {self.cause}"
 
 
-def history_of(caller: DeviceClient) -> History:
+def history_of(client: DeviceClient) -> History:
     """Ask a device for its past; it need not be owned."""
     return History(
         *(
-            _told(caller, parameter)
+            _told(client, parameter)
             for parameter in (
                 Parameter.BOOT_COUNT,
                 Parameter.RESET_CAUSE,
@@ -72,8 +72,8 @@ def history_of(caller: DeviceClient) -> History:
     )
 
 
-def _told(caller: DeviceClient, parameter: Parameter) -> int | None:
-    found = caller.ask(ParameterGet(parameter), ParameterValue, lambda answer: answer.id == parameter)
+def _told(client: DeviceClient, parameter: Parameter) -> int | None:
+    found = client.request(ParameterGet(parameter), ParameterValue, lambda answer: answer.id == parameter)
     return found.value if found is not None and found.result == Result.OK else None
 
 

@@ -83,11 +83,11 @@ class DeviceClient:
             else 0
         )
 
-    def say(self, message: Message) -> None:
+    def send(self, message: Message) -> None:
         """Send a message."""
         self._link.send(pack(message, self._node))
 
-    def hear(self, timeout: float) -> Message | None:
+    def receive(self, timeout: float) -> Message | None:
         """Return the next message of this device; None after `timeout` (s)."""
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
@@ -97,7 +97,7 @@ class DeviceClient:
                 return message
         return None
 
-    def overhear(self, timeout: float) -> tuple[int, Message] | None:
+    def receive_any(self, timeout: float) -> tuple[int, Message] | None:
         """Return node and message of the next frame of any device or host; None after `timeout` (s)."""
         frame = self._link.receive(timeout)
         if frame is None:
@@ -115,7 +115,7 @@ class DeviceClient:
         """Read and sort every message that arrives within `seconds`."""
         self._listen_until(self._clock.now_ns() + int(1e9 * seconds))
 
-    def hear_sample(self, timeout: float) -> SampleReport | None:
+    def receive_sample(self, timeout: float) -> SampleReport | None:
         """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
         sample = self._until(timeout, SampleReport, lambda _: True)
         for _ in range(MOST_WAITING):
@@ -126,7 +126,7 @@ class DeviceClient:
             sample = message if isinstance(message, SampleReport) else sample
         return sample
 
-    def ask(
+    def request(
         self, question: Message, answer: type[_Answer], fits: Callable[[_Answer], bool] = lambda _: True
     ) -> _Answer | None:
         """Ask, and ask again, until an answer of that type fits; None if none came in time."""
@@ -157,7 +157,7 @@ class DeviceClient:
     def _ask_once(self, question: Message, key: object) -> None:
         owed = self._owed.get(key, _Owed(0, 0))
         self._owed[key] = owed._replace(answers=owed.answers + 1)
-        self.say(question)
+        self.send(question)
 
     def _await_owed(self, key: object) -> None:
         """Receive late answers to earlier requests of the same kind."""
@@ -165,7 +165,7 @@ class DeviceClient:
             left_ns = owed.until_ns - self._clock.now_ns()
             if owed.answers <= 0 or left_ns <= 0:
                 break
-            self.hear(1e-9 * left_ns)
+            self.receive(1e-9 * left_ns)
         self._owed.pop(key, None)
 
     def _let_owed_come(self, key: object, *, answered: bool) -> None:
@@ -178,7 +178,7 @@ class DeviceClient:
 
     def _listen_until(self, deadline_ns: int) -> None:
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            self.hear(1e-9 * left_ns)
+            self.receive(1e-9 * left_ns)
 
     def _understand(self, frame: Frame) -> Message | None:
         try:
@@ -225,7 +225,7 @@ class DeviceClient:
     def _until(self, timeout: float, kind: type[_Answer], fits: Callable[[_Answer], bool]) -> _Answer | None:
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            message = self.hear(1e-9 * left_ns)
+            message = self.receive(1e-9 * left_ns)
             if isinstance(message, kind) and fits(message):
                 return message
         return None

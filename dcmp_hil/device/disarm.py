@@ -32,7 +32,7 @@ class Disarm:
 
     Parameters
     ----------
-    caller
+    client
         On the link; it knows the tick of the newest SAMPLE.
     clock
         Bounds the waiting.
@@ -42,8 +42,8 @@ class Disarm:
         ms, of the last commands.
     """
 
-    def __init__(self, caller: DeviceClient, clock: Clock, session: int, ttl_ms: int) -> None:
-        self._caller, self._clock = caller, clock
+    def __init__(self, client: DeviceClient, clock: Clock, session: int, ttl_ms: int) -> None:
+        self._client, self._clock = client, clock
         self._session, self._ttl_ms = session, ttl_ms
 
     def run(self, *, answered: bool) -> DeviceEnd | None:
@@ -60,7 +60,7 @@ class Disarm:
             said = 1
         deadline_ns = self._clock.now_ns() + _PATIENCE_NS
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            sample = self._caller.hear_sample(1e-9 * left_ns)
+            sample = self._client.receive_sample(1e-9 * left_ns)
             if sample is None:
                 return None
             confirmed = sample.state in _AT_REST and sample.voltage_mV == 0
@@ -78,14 +78,14 @@ class Disarm:
             return
         until_ns = self._clock.now_ns() + _HEALTH_NS
         while (left_ns := until_ns - self._clock.now_ns()) > 0:
-            if isinstance(self._caller.hear(1e-9 * left_ns), Health):
+            if isinstance(self._client.receive(1e-9 * left_ns), Health):
                 return
 
     def _fault_of(self, sample: SampleReport) -> str:
         if sample.state != State.FAULT:
             return ""
-        return name_of(self._caller.fault or sample.fault_class)
+        return name_of(self._client.fault or sample.fault_class)
 
     def _say(self, *, release: bool) -> None:
-        seq = self._caller.tick & 0x1FFF
-        self._caller.say(Drive(0, seq, False, False, release, self._session, self._ttl_ms))
+        seq = self._client.tick & 0x1FFF
+        self._client.send(Drive(0, seq, False, False, release, self._session, self._ttl_ms))

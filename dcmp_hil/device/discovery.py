@@ -181,15 +181,15 @@ def _ask(
         nodes = _hear_nodes(DeviceClient(link, clock, 0), clock, wait)
         found = {}
         for node, twice in nodes.items():
-            caller = DeviceClient(link, clock, node)
-            words = _describe(caller, node, twice=twice)
-            found[node] = words, history_of(caller).sentence if history else ""
+            client = DeviceClient(link, clock, node)
+            words = _describe(client, node, twice=twice)
+            found[node] = words, history_of(client).sentence if history else ""
         return found, link.corrupt > 0
     finally:
         link.close()
 
 
-def _hear_nodes(caller: DeviceClient, clock: Clock, wait: float) -> dict[int, bool]:
+def _hear_nodes(client: DeviceClient, clock: Clock, wait: float) -> dict[int, bool]:
     """Return the nodes that were heard, and whether each is there twice.
 
     Two SAMPLEs, one tick after the other, are no accident; `wait` (s) is for the first.
@@ -200,7 +200,7 @@ def _hear_nodes(caller: DeviceClient, clock: Clock, wait: float) -> dict[int, bo
     watches: dict[int, TickWatch] = {}
     longest_ns = deadline_ns + int(1e9 * _TWO_DEVICES_LISTEN_S)
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
-        heard = caller.overhear(1e-9 * left_ns)
+        heard = client.receive_any(1e-9 * left_ns)
         if heard is None:
             continue
         node, sample = heard
@@ -219,9 +219,9 @@ def _hear_nodes(caller: DeviceClient, clock: Clock, wait: float) -> dict[int, bo
     return {node: node in twice for node in sorted(nodes | twice)}
 
 
-def _describe(caller: DeviceClient, node: int, *, twice: bool) -> str:
-    identity = caller.ask(Hello(_ASKS_ONLY, PROTOCOL_HASH), Identity)
-    sample = caller.hear_sample(LISTEN)
+def _describe(client: DeviceClient, node: int, *, twice: bool) -> str:
+    identity = client.request(Hello(_ASKS_ONLY, PROTOCOL_HASH), Identity)
+    sample = client.receive_sample(LISTEN)
     words = [f"node {node}"]
     if twice:
         words.append("TWO devices with this node (unplug one)")

@@ -36,7 +36,7 @@ class Clearing:
     ----------
     name
         What to call the link.
-    caller
+    client
         On it; it has joined the device's ticks.
     clock
         Bounds the waiting.
@@ -51,14 +51,14 @@ class Clearing:
     def __init__(
         self,
         name: str,
-        caller: DeviceClient,
+        client: DeviceClient,
         clock: Clock,
         session: int,
         ttl_ms: int,
         *,
         allowed: bool = False,
     ) -> None:
-        self._name, self._caller, self._clock = name, caller, clock
+        self._name, self._client, self._clock = name, client, clock
         self._session, self._ttl_ms, self._allowed = session, ttl_ms, allowed
 
     def run(self) -> str:
@@ -77,40 +77,40 @@ class Clearing:
         clear = False
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            sample = self._caller.hear_sample(1e-9 * left_ns)
+            sample = self._client.receive_sample(1e-9 * left_ns)
             if sample is None:
                 break
             if sample.state != State.FAULT:
                 return name_of(code)
             self._check_same(code)
-            seq = self._caller.tick & _SEQUENCE_MASK
-            self._caller.say(Drive(0, seq, False, clear, False, self._session, self._ttl_ms))
+            seq = self._client.tick & _SEQUENCE_MASK
+            self._client.send(Drive(0, seq, False, clear, False, self._session, self._ttl_ms))
             clear = not clear
         raise open_errors.faulty(self._name, name_of(code))
 
     def _named(self) -> int:
         """Return the code of the fault that is latched; 0 if none is."""
-        caller = self._caller
-        if caller.sample is None or caller.sample.state != State.FAULT:
+        client = self._client
+        if client.sample is None or client.sample.state != State.FAULT:
             return 0
-        caller.fault = 0  # of before
+        client.fault = 0  # of before
         deadline_ns = self._clock.now_ns() + int(1e9 * _FAULT_REPORT_TIMEOUT_S)
-        while not caller.fault and (left_ns := deadline_ns - self._clock.now_ns()) > 0:
-            caller.hear(1e-9 * left_ns)
-        if caller.sample.state != State.FAULT:
+        while not client.fault and (left_ns := deadline_ns - self._clock.now_ns()) > 0:
+            client.receive(1e-9 * left_ns)
+        if client.sample.state != State.FAULT:
             return 0
-        known = caller.sample.fault_class if caller.sample.fault_class < _OTHER_FAULT_CLASS else Fault.UNKNOWN
-        return caller.fault or known
+        known = client.sample.fault_class if client.sample.fault_class < _OTHER_FAULT_CLASS else Fault.UNKNOWN
+        return client.fault or known
 
     def _waits_for_person(self, code: int) -> bool:
         """Whether this fault is cleared only where a person has said so."""
         if code == Fault.STOPPED:  # by a program, at a trip or where samples were missing: as any other fault
-            return self._caller.fault != code or self._caller.fault_detail == StopReason.PERSON
+            return self._client.fault != code or self._client.fault_detail == StopReason.PERSON
         return code not in _OF_A_RUN
 
     def _check_same(self, code: int) -> None:
         """Stop where the device names another fault than at the start."""
-        sample, told = self._caller.sample, self._caller.fault
+        sample, told = self._client.sample, self._client.fault
         seen = sample.fault_class if sample is not None else 0
         if told not in {0, code}:
             raise open_errors.other_fault(self._name, name_of(code), name_of(told))

@@ -70,7 +70,7 @@ class Handshake:
     ----------
     link
         Open; its name and its count of damaged input are used.
-    caller
+    client
         On that link.
     terms
         What the rig says of the device.
@@ -81,12 +81,12 @@ class Handshake:
     """
 
     def __init__(
-        self, link: Link, caller: DeviceClient, terms: DeviceConfig, clock: Clock, *, clear: bool = False
+        self, link: Link, client: DeviceClient, terms: DeviceConfig, clock: Clock, *, clear: bool = False
     ) -> None:
-        self._link, self._caller, self._terms, self._clock = link, caller, terms, clock
+        self._link, self._client, self._terms, self._clock = link, client, terms, clock
         self._clear = clear
         self._session = 1 + secrets.randbelow(0xFFFF)
-        self._parameters = DeviceParameters(link.name, caller, self._session)
+        self._parameters = DeviceParameters(link.name, client, self._session)
         self._damaged_before = 0
         self._booted_ns = 0  # the latest that a board has booted
 
@@ -110,7 +110,7 @@ class Handshake:
             self._check_round_trip()
             found = self._parameters.compared()
             told = self._compare(found)
-            past = history_of(self._caller)
+            past = history_of(self._client)
             self._check_alone()
             self._join_ticks()
             cleared = self._clearing().run()
@@ -129,15 +129,15 @@ class Handshake:
                 self._give_back()
             raise
         remarks = (*told, *past.remarks, *_about(cleared))
-        return Greeting(self._session, self._caller.tick, firmware, cleared, past.sentence, remarks, zero)
+        return Greeting(self._session, self._client.tick, firmware, cleared, past.sentence, remarks, zero)
 
     @property
     def _damaged(self) -> int:
-        return self._link.corrupt + self._caller.corrupt
+        return self._link.corrupt + self._client.corrupt
 
     def _blamed(self, error: OpenError) -> OpenError:
         """Blame the line for it, where the line damages frames."""
-        here, there = self._damaged - self._damaged_before, self._caller.damaged_there
+        here, there = self._damaged - self._damaged_before, self._client.damaged_there
         if max(here, there) < _MANY_DAMAGED:
             return error
         return open_errors.damaged(self._link.name, here, there, error)
@@ -145,28 +145,28 @@ class Handshake:
     def _stop(self) -> None:
         """Leave nothing armed; the end of a run that a person asked for here is cleared by the next start."""
         with contextlib.suppress(BackendError):
-            self._caller.say(Stop(StopReason.REQUESTED))
+            self._client.send(Stop(StopReason.REQUESTED))
 
     def _give_back(self) -> None:
         """Release the session, so that the next host need not wait until it lapses."""
         with contextlib.suppress(BackendError):
             self._parameters.get(Parameter.TICK)
             for _ in range(_RELEASES):
-                self._caller.hear_sample(_NEXT_S)  # a command must answer a newer one than the last did
+                self._client.receive_sample(_NEXT_S)  # a command must answer a newer one than the last did
                 self._say(release=True)
 
     def _listen(self) -> None:
-        caller, wait = self._caller, self._terms.boot_wait
-        if caller.hear_sample(1e-9 * (self._booted_ns - self._clock.now_ns())) is not None:
+        client, wait = self._client, self._terms.boot_wait
+        if client.receive_sample(1e-9 * (self._booted_ns - self._clock.now_ns())) is not None:
             return
         name = self._link.name
-        if caller.heard:
+        if client.heard:
             raise open_errors.no_samples(
-                name, wait, " and ".join(kind.upper() for kind in sorted(caller.heard))
+                name, wait, " and ".join(kind.upper() for kind in sorted(client.heard))
             )
-        if caller.nodes:
-            raise open_errors.other_node(name, self._terms.node, caller.nodes)
-        if self._link.corrupt or caller.corrupt:
+        if client.nodes:
+            raise open_errors.other_node(name, self._terms.node, client.nodes)
+        if self._link.corrupt or client.corrupt:
             raise open_errors.only_damage(name, self._link.other_carrier)
         raise open_errors.silence(name, wait)
 
@@ -181,7 +181,7 @@ class Handshake:
                 told += 1
             else:
                 told = 0
-                self._caller.listen(1e-3 * (5 + secrets.randbelow(20)))
+                self._client.listen(1e-3 * (5 + secrets.randbelow(20)))
             if told == _OWNED_ANSWERS_MIN:
                 return firmware
         self._check_alone()
@@ -193,12 +193,12 @@ class Handshake:
         """Ask with HELLO; where all fell silent meanwhile, a board boots because its port was opened."""
         hello = Hello(self._session, PROTOCOL_HASH)
         while True:
-            before = self._caller.heard[SampleReport.__name__]
-            identity = self._caller.ask(hello, Identity)
+            before = self._client.heard[SampleReport.__name__]
+            identity = self._client.request(hello, Identity)
             if identity is not None:
                 return identity
             booted = self._clock.now_ns() >= self._booted_ns
-            if booted or self._caller.heard[SampleReport.__name__] != before:
+            if booted or self._client.heard[SampleReport.__name__] != before:
                 raise open_errors.deaf(self._link.name)
             self._listen()
 
@@ -220,7 +220,7 @@ class Handshake:
         """Refuse a line on which every command would be too old: a USB adapter may collect bytes."""
         best, waited = math.inf, False
         for _ in range(_ROUND_TRIPS):
-            trip = self._caller.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
+            trip = self._client.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
             best, waited = min(best, trip or math.inf), waited or trip is None
             if best <= _COMMAND_AGE_MAX_S + 1e-6 * self._terms.period_us:
                 break
@@ -231,9 +231,9 @@ class Handshake:
 
     def _check_alone(self) -> None:
         """Raise if a second device has the same node number; listen longer if the ticks are odd."""
-        ticks = self._caller.ticks
+        ticks = self._client.ticks
         if ticks.suspicious:
-            self._caller.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._terms.period_us))
+            self._client.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._terms.period_us))
         if ticks.two_devices:
             raise open_errors.two_devices(self._link.name, self._terms.node)
 
@@ -241,7 +241,7 @@ class Handshake:
         """Refuse a device that puts out a voltage before it is armed."""
         said = ""
         for _ in range(_HOT_SAMPLES):
-            sample = self._caller.hear_sample(PATIENCE)
+            sample = self._client.receive_sample(PATIENCE)
             if sample is None or sample.state == State.RUN or sample.voltage_mV == 0:
                 return
             said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed"
@@ -250,7 +250,7 @@ class Handshake:
     def _clearing(self) -> Clearing:
         return Clearing(
             self._link.name,
-            self._caller,
+            self._client,
             self._clock,
             self._session,
             self._terms.watchdog_ms,
@@ -261,28 +261,28 @@ class Handshake:
         """Answer SAMPLEs at 0 V until one says RUN."""
         deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
         while self._clock.now_ns() < deadline_ns:
-            sample = self._caller.hear_sample(PATIENCE)
+            sample = self._client.receive_sample(PATIENCE)
             if sample is not None:
                 self._say(arm=True)
                 if sample.state == State.RUN:
                     return
         self._check_alone()
-        sample = self._caller.sample
+        sample = self._client.sample
         state = State(sample.state).name if sample and sample.state in set(State) else "an unknown state"
         raise open_errors.not_armed(self._link.name, state, PATIENCE)
 
     def _say(self, *, arm: bool = False, release: bool = False) -> None:
-        seq = self._caller.tick & 0x1FFF
-        self._caller.say(Drive(0, seq, arm, False, release, self._session, self._terms.watchdog_ms))
+        seq = self._client.tick & 0x1FFF
+        self._client.send(Drive(0, seq, arm, False, release, self._session, self._terms.watchdog_ms))
 
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""
         told = 0
         for _ in range(_TICK_JOIN_ATTEMPTS):
             told = self._parameters.get(Parameter.TICK)
-            if self._caller.hear_sample(PATIENCE) is None:
+            if self._client.receive_sample(PATIENCE) is None:
                 continue
-            if _TICK_DIFFERENCE_MIN <= self._caller.tick - told <= _TICK_DIFFERENCE_MAX:
+            if _TICK_DIFFERENCE_MIN <= self._client.tick - told <= _TICK_DIFFERENCE_MAX:
                 return
         raise open_errors.impossible(self._link.name, f"TICK = {told}, and its SAMPLEs have other ticks")
 

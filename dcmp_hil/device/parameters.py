@@ -27,14 +27,14 @@ class DeviceParameters:
     ----------
     name
         Of the link, for what is refused.
-    caller
+    client
         On that link.
     session
         That owns the device when something is set.
     """
 
-    def __init__(self, name: str, caller: DeviceClient, session: int) -> None:
-        self._name, self._caller, self._session = name, caller, session
+    def __init__(self, name: str, client: DeviceClient, session: int) -> None:
+        self._name, self._client, self._session = name, client, session
 
     def get(self, parameter: Parameter) -> int:
         """Return a value that is possible on any device.
@@ -105,11 +105,11 @@ class DeviceParameters:
         """Return the count of an arm that hangs now: the middle one of three, so that a wrong one is none."""
         counts: list[int] = []
         while len(counts) < _COUNT_READINGS:
-            sample = self._caller.hear_sample(PATIENCE)
+            sample = self._client.receive_sample(PATIENCE)
             if sample is None:
                 raise open_errors.no_samples(self._name, PATIENCE, "nothing")
             counts.append(unwrap(counts[0] if counts else 0, sample.position_counts, 24))
         return sorted(counts)[_COUNT_READINGS // 2] % _COUNTS
 
     def _ask(self, question: ParameterGet | ParameterSet) -> ParameterValue | None:
-        return self._caller.ask(question, ParameterValue, lambda answer: answer.id == question.id)
+        return self._client.request(question, ParameterValue, lambda answer: answer.id == question.id)
