@@ -56,9 +56,9 @@ class DeviceBackend:
     """
 
     def __init__(self, rig: Rig, link: Link, clock: Clock) -> None:
-        self._terms = terms = DeviceConfig.of(rig)
+        self._config = config = DeviceConfig.of(rig)
         self._link, self._clock = link, clock
-        self._node, self._period = terms.node, rig.period
+        self._node, self._period = config.node, rig.period
         self._patience_ns = int(1e9 * max(_SILENT_PERIODS * rig.period, _SILENT_S))
         self._open = False
         self._session = 0
@@ -68,14 +68,14 @@ class DeviceBackend:
         self._t = 0.0
         self._fault: int = Fault.NONE
         self._left = 0  # the fault that ended RUN
-        self._ttl_ms = terms.watchdog_ms
-        self._memory = math.ceil(1e-3 * terms.watchdog_ms / rig.period) + 2  # periods that a command holds
+        self._ttl_ms = config.watchdog_ms
+        self._memory = math.ceil(1e-3 * config.watchdog_ms / rig.period) + 2  # periods that a command holds
         self._bridge_ns = int(_MOST_LOST * 1e9 * rig.period)
         self._heard_ns = 0
         self._forgotten = False  # the device has ended our session, and another host may own it
         self._answered = 0  # tick of the SAMPLE that was answered last
         self._meter = LinkMeter(link, 1e9 * rig.period)
-        self._rates = terms.warn_share, terms.warn_clock_share
+        self._rates = config.warn_share, config.warn_clock_share
         self.firmware = self._cleared = self._history = ""
         self.clear = False  # whether a person has said that a latched fault of every kind may be cleared
         self.remarks: tuple[str, ...] = ()  # what a person should know of this device
@@ -94,7 +94,7 @@ class DeviceBackend:
         self._link.open()
         try:
             client = DeviceClient(self._link, self._clock, self._node)
-            greeting = Handshake(self._link, client, self._terms, self._clock, clear=self.clear).run()
+            greeting = Handshake(self._link, client, self._config, self._clock, clear=self.clear).run()
         except BaseException:
             self._link.close()
             raise
@@ -171,13 +171,13 @@ class DeviceBackend:
         _, voltage_mV, _, state, _, _, _ = report
         if state == _RUN and self._tick - self._answered > self._memory:
             raise open_errors.taken_over(self._link.name)
-        position = (self._count - self._zero) * self._terms.rad_per_count
+        position = (self._count - self._zero) * self._config.rad_per_count
         fault = _HEALTHY if state == _RUN else self._fault_in(report, last)
-        return make(Sample, (self._t, position, voltage_mV / self._terms.mV_per_V, fault))
+        return make(Sample, (self._t, position, voltage_mV / self._config.mV_per_V, fault))
 
     def write(self, voltage: float) -> None:
         """Send a voltage, V; a number that is not finite is sent as 0 V."""
-        asked_mV = voltage * self._terms.mV_per_V
+        asked_mV = voltage * self._config.mV_per_V
         if not -_MOST_mV <= asked_mV <= _MOST_mV:
             asked_mV = math.copysign(_MOST_mV, asked_mV) if math.isfinite(asked_mV) else 0.0
         sequence = self._tick & _SEQUENCE_MASK
@@ -267,7 +267,7 @@ class DeviceBackend:
 
     def _start_counting(self, raw: int) -> None:
         self._has_count = True
-        zero = self._terms.zero
+        zero = self._config.zero
         self._zero = unwrap(0, self._hanging, 24) if zero is None else zero
         self._count = unwrap(self._zero, raw, 24)  # near the counter's wrap it matters
 

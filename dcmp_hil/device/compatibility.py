@@ -49,36 +49,36 @@ def is_possible(parameter: Parameter, value: int) -> bool:
     return lowest <= value <= highest
 
 
-def differences(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
+def differences(config: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return the differences of device and rig, each with its remedy.
 
     Parameters
     ----------
-    terms
+    config
         What the rig says.
     device
         The values of COMPARED, all of them possible.
     """
-    return [sentence for sentence in (*_same(terms, device), *_limits(terms, device)) if sentence]
+    return [sentence for sentence in (*_same(config, device), *_limits(config, device)) if sentence]
 
 
-def remarks(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
+def remarks(config: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return remarks on properties of the device that the rig does not state and does not need."""
     slew = device[Parameter.SLEW_MV_PER_MS]
     sentence = (
         f"amplifier.slew_V_s: the rig says none, the device changes its voltage by {slew:g} V/s at most. Put "
         "that into the rig, and the loop reckons with it."
     )
-    return [sentence] if slew and terms.slew_mV_per_ms is None else []
+    return [sentence] if slew and config.slew_mV_per_ms is None else []
 
 
-def _same(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
+def _same(config: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     counts = device[Parameter.COUNTS_PER_REV]
-    rate_hz, asked_hz = 1e6 / device[Parameter.PERIOD_US], 1e6 / terms.period_us
-    found = [_supply(terms.supply_mV, device[Parameter.SUPPLY_MV])]
-    if counts != terms.counts_per_rev:
+    rate_hz, asked_hz = 1e6 / device[Parameter.PERIOD_US], 1e6 / config.period_us
+    found = [_supply(config.supply_mV, device[Parameter.SUPPLY_MV])]
+    if counts != config.counts_per_rev:
         found.append(
-            f"encoder.counts_per_rev: the rig says {terms.counts_per_rev}, the device {counts}. "
+            f"encoder.counts_per_rev: the rig says {config.counts_per_rev}, the device {counts}. "
             "Correct the rig, or build the firmware for this encoder."
         )
     if rate_hz != asked_hz:
@@ -106,34 +106,34 @@ def _supply(asked_mV: int, found_mV: int) -> str:
     )
 
 
-def _limits(terms: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
+def _limits(config: DeviceConfig, device: Mapping[Parameter, int]) -> list[str]:
     """Return the limits of the device that are below the rig's.
 
     Travel as the board was built with it counts from where the device was armed first: with a zero that is
     a count that may be half a turn from hanging.
     """
     rad = math.tau / device[Parameter.COUNTS_PER_REV]
-    away = 0.0 if terms.zero is None else math.pi
+    away = 0.0 if config.zero is None else math.pi
     limits: list[tuple[str, float | None, float]] = [
         (
             "amplifier.voltage_limit_V",
-            1e-3 * terms.voltage_limit_mV,
+            1e-3 * config.voltage_limit_mV,
             1e-3 * device[Parameter.VOLTAGE_LIMIT_MV],
         ),
         (
             "supervisor.velocity_limit_rad_s",
-            terms.velocity_limit,
+            config.velocity_limit,
             _rounded_down(rad * device[Parameter.SPEED_LIMIT_COUNTS_S]),
         ),
         (
             "supervisor.position_limit_rad",
-            terms.position_limit,
+            config.position_limit,
             _rounded_down(rad * device[Parameter.TRAVEL_LIMIT_COUNTS] - away),
         ),
     ]
     slew = device[Parameter.SLEW_MV_PER_MS]
     if slew:
-        limits.append(("amplifier.slew_V_s", terms.slew_mV_per_ms, slew))
+        limits.append(("amplifier.slew_V_s", config.slew_mV_per_ms, slew))
     return [
         f"{key}: the rig says {asked:g}, the device allows {allowed:g}. Lower it in the rig."
         for key, asked, allowed in limits

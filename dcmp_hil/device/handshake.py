@@ -72,7 +72,7 @@ class Handshake:
         Open; its name and its count of damaged input are used.
     client
         On that link.
-    terms
+    config
         What the rig says of the device.
     clock
         Times round trips.
@@ -81,9 +81,9 @@ class Handshake:
     """
 
     def __init__(
-        self, link: Link, client: DeviceClient, terms: DeviceConfig, clock: Clock, *, clear: bool = False
+        self, link: Link, client: DeviceClient, config: DeviceConfig, clock: Clock, *, clear: bool = False
     ) -> None:
-        self._link, self._client, self._terms, self._clock = link, client, terms, clock
+        self._link, self._client, self._config, self._clock = link, client, config, clock
         self._clear = clear
         self._session = 1 + secrets.randbelow(0xFFFF)
         self._parameters = DeviceParameters(link.name, client, self._session)
@@ -101,7 +101,7 @@ class Handshake:
         ConfigError
             If the device is not what the rig says.
         """
-        self._booted_ns = self._clock.now_ns() + int(1e9 * self._terms.boot_wait)
+        self._booted_ns = self._clock.now_ns() + int(1e9 * self._config.boot_wait)
         self._listen()
         self._damaged_before = self._damaged
         arming = False
@@ -114,7 +114,7 @@ class Handshake:
             self._check_alone()
             self._join_ticks()
             cleared = self._clearing().run()
-            zero = self._parameters.put_limits(self._terms, found)
+            zero = self._parameters.put_limits(self._config, found)
             self._join_ticks()
             self._check_cold()
             arming = True
@@ -156,7 +156,7 @@ class Handshake:
                 self._say(release=True)
 
     def _listen(self) -> None:
-        client, wait = self._client, self._terms.boot_wait
+        client, wait = self._client, self._config.boot_wait
         if client.receive_sample(1e-9 * (self._booted_ns - self._clock.now_ns())) is not None:
             return
         name = self._link.name
@@ -165,7 +165,7 @@ class Handshake:
                 name, wait, " and ".join(kind.upper() for kind in sorted(client.heard))
             )
         if client.nodes:
-            raise open_errors.other_node(name, self._terms.node, client.nodes)
+            raise open_errors.other_node(name, self._config.node, client.nodes)
         if self._link.corrupt or client.corrupt:
             raise open_errors.only_damage(name, self._link.other_carrier)
         raise open_errors.silence(name, wait)
@@ -211,10 +211,10 @@ class Handshake:
 
     def _compare(self, found: Mapping[Parameter, int]) -> list[str]:
         """Hold the rig against the device, every difference at once; return what is worth a remark."""
-        faults = differences(self._terms, found)
+        faults = differences(self._config, found)
         if faults:
             raise ConfigError(*faults)
-        return remarks(self._terms, found)
+        return remarks(self._config, found)
 
     def _check_round_trip(self) -> None:
         """Refuse a line on which every command would be too old: a USB adapter may collect bytes."""
@@ -222,7 +222,7 @@ class Handshake:
         for _ in range(_ROUND_TRIPS):
             trip = self._client.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
             best, waited = min(best, trip or math.inf), waited or trip is None
-            if best <= _COMMAND_AGE_MAX_S + 1e-6 * self._terms.period_us:
+            if best <= _COMMAND_AGE_MAX_S + 1e-6 * self._config.period_us:
                 break
         else:
             raise open_errors.slow(self._link.name, best)
@@ -233,9 +233,9 @@ class Handshake:
         """Raise if a second device has the same node number; listen longer if the ticks are odd."""
         ticks = self._client.ticks
         if ticks.suspicious:
-            self._client.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._terms.period_us))
+            self._client.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us))
         if ticks.two_devices:
-            raise open_errors.two_devices(self._link.name, self._terms.node)
+            raise open_errors.two_devices(self._link.name, self._config.node)
 
     def _check_cold(self) -> None:
         """Refuse a device that puts out a voltage before it is armed."""
@@ -253,7 +253,7 @@ class Handshake:
             self._client,
             self._clock,
             self._session,
-            self._terms.watchdog_ms,
+            self._config.watchdog_ms,
             allowed=self._clear,
         )
 
@@ -273,7 +273,7 @@ class Handshake:
 
     def _say(self, *, arm: bool = False, release: bool = False) -> None:
         seq = self._client.tick & 0x1FFF
-        self._client.send(Drive(0, seq, arm, False, release, self._session, self._terms.watchdog_ms))
+        self._client.send(Drive(0, seq, arm, False, release, self._session, self._config.watchdog_ms))
 
     def _join_ticks(self) -> None:
         """Find the whole tick of which SAMPLE shows the low byte; the caller counts on."""

@@ -55,14 +55,14 @@ class DeviceParameters:
         """Return the device's parameters that are compared with the rig."""
         return {parameter: self.get(parameter) for parameter in COMPARED}
 
-    def put_limits(self, terms: DeviceConfig, built: Mapping[Parameter, int]) -> int:
+    def put_limits(self, config: DeviceConfig, built: Mapping[Parameter, int]) -> int:
         """Lower the device's limits to the rig's, and read back that it keeps them.
 
         They are the session's: they end with it. Never more is set than the board was built with.
 
         Parameters
         ----------
-        terms
+        config
             What the rig says.
         built
             What the device said before anything was set.
@@ -78,16 +78,16 @@ class DeviceParameters:
             If the device does not take a value, or does not keep it.
         """
         speed, travel = Parameter.SPEED_LIMIT_COUNTS_S, Parameter.TRAVEL_LIMIT_COUNTS
-        zero = self._hanging() if terms.zero is None else terms.zero % _COUNTS
+        zero = self._hanging() if config.zero is None else config.zero % _COUNTS
         asked = {
-            Parameter.WATCHDOG_MS: terms.watchdog_ms,
-            Parameter.VOLTAGE_LIMIT_MV: terms.voltage_limit_mV,
-            speed: min(terms.speed_limit_counts_s, built[speed]),
-            travel: min(terms.travel_limit_counts, built[travel]),
+            Parameter.WATCHDOG_MS: config.watchdog_ms,
+            Parameter.VOLTAGE_LIMIT_MV: config.voltage_limit_mV,
+            speed: min(config.speed_limit_counts_s, built[speed]),
+            travel: min(config.travel_limit_counts, built[travel]),
             Parameter.TRAVEL_ORIGIN_COUNTS: zero,
         }
-        if terms.slew_mV_per_ms is not None:
-            asked[Parameter.SLEW_MV_PER_MS] = terms.slew_mV_per_ms
+        if config.slew_mV_per_ms is not None:
+            asked[Parameter.SLEW_MV_PER_MS] = config.slew_mV_per_ms
         for parameter, value in asked.items():
             self._put(parameter, value)
         for parameter, value in asked.items():

@@ -43,11 +43,11 @@ def test_second_host_on_a_port_is_told_who_has_it(kind: str) -> None:
 def test_host_that_does_not_fit_gives_the_device_back_at_once(kind: str) -> None:
     with on_bench(kind) as bench:
         host = bench.device()
-        fitting = host._terms  # noqa: SLF001
-        host._terms = replace(fitting, counts_per_rev=2000)  # noqa: SLF001
+        fitting = host._config  # noqa: SLF001
+        host._config = replace(fitting, counts_per_rev=2000)  # noqa: SLF001
         with pytest.raises(ConfigError, match="the rig says 2000, the device 4096"):
             host.__enter__()
-        host._terms = fitting  # noqa: SLF001
+        host._config = fitting  # noqa: SLF001
         with host:
             assert drive(host, 1.0, 3)[-1].voltage == 1.0
 

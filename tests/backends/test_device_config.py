@@ -12,7 +12,7 @@ from tests.helpers import bench
 
 
 def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
-    terms = DeviceConfig.of(
+    config = DeviceConfig.of(
         bench(
             "backend.kind=serial",
             "backend.port=/dev/null",
@@ -28,7 +28,7 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
             "amplifier.supply_V=24",
         )
     )
-    assert terms == DeviceConfig(
+    assert config == DeviceConfig(
         *(3, 2000, 2000, 4500, 250, 15, -math.tau / 2000, -1000.0, 24_000, -7, 20.0, 6.2832),
         *(6491, 2000, 3.0, 0.005, 0.005),
     )
@@ -36,16 +36,16 @@ def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
 
 @pytest.mark.parametrize(("limit", "counts"), [(2.0, 1428), (6366.2, 4_150_242), (0.01, 131)])
 def test_a_speed_limit_in_counts_is_the_rigs_and_one_count_in_8_ms(limit: float, counts: int) -> None:
-    terms = DeviceConfig.of(
+    config = DeviceConfig.of(
         bench(
             "backend.kind=sim-board",
             'supervisor.monitors="finite"',
             f"supervisor.velocity_limit_rad_s={limit}",
         )
     )
-    assert terms.speed_limit_counts_s == counts
-    assert terms.velocity_limit is None
-    assert 0.0 <= limit + math.tau / 4096 / 8e-3 - counts * terms.rad_per_count < terms.rad_per_count
+    assert config.speed_limit_counts_s == counts
+    assert config.velocity_limit is None
+    assert 0.0 <= limit + math.tau / 4096 / 8e-3 - counts * config.rad_per_count < config.rad_per_count
 
 
 def test_terms_of_a_rig_without_a_wire_are_refused() -> None:
