@@ -9,7 +9,7 @@ from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.device import open_errors
 from dcmp_hil.device.client import MOST_WAITING, DeviceClient
 from dcmp_hil.device.device_config import DeviceConfig
-from dcmp_hil.device.disarm import DeviceEnd, Disarm
+from dcmp_hil.device.disarm import DeviceEnd, DisarmSequence
 from dcmp_hil.device.handshake import Handshake
 from dcmp_hil.device.link_statistics import LinkMeter
 from dcmp_hil.device.run_state_exit import another_runs, why_left
@@ -291,8 +291,8 @@ class DeviceBackend:
             return
         if isinstance(error, TripError) and not error.orderly:
             client.send(Stop(StopReason.SUPERVISOR))
-        goodbye = Disarm(client, self._clock, self._session, self._ttl_ms)
-        self.device_end = goodbye.run(answered=self._answered == self._tick)
+        sequence = DisarmSequence(client, self._clock, self._session, self._ttl_ms)
+        self.device_end = sequence.run(answered=self._answered == self._tick)
         self._meter.take_health(client.health)
         if self.device_end is None:
             client.send(Stop(StopReason.NO_SAMPLE))

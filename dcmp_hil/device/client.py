@@ -1,4 +1,4 @@
-"""Asking a device and waiting for its answer: what handshake, goodbye and `ports` have in common."""
+"""Asking a device and waiting for its answer: what handshake, disarm and `ports` have in common."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class DeviceEnd(NamedTuple):
     fault: str  # its name; empty without one
 
 
-class Disarm:
+class DisarmSequence:
     """The end of a session.
 
     Parameters

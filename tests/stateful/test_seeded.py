@@ -10,7 +10,7 @@ import pytest
 from hypothesis.stateful import run_state_machine_as_test
 
 from dcmp_hil.device.backend import DeviceBackend
-from dcmp_hil.device.disarm import Disarm
+from dcmp_hil.device.disarm import DisarmSequence
 from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import FiniteMonitor
 from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent, Supervisor
@@ -60,7 +60,7 @@ IN_HOST = {
     "no clamp": _method(Limiter, "limit_voltage", lambda _, __, demand, ___: demand),
     "NaN is let through": _method(Supervisor, "safe_voltage", _safe_voltage_nan),
     "a fault of the device is not seen": _method(DeviceBackend, "_fault_in", lambda *_: Fault.NONE),
-    "no goodbye": _method(Disarm, "run", lambda *_, **__: True),
+    "no disarm at the end": _method(DisarmSequence, "run", lambda *_, **__: True),
 }
 
 IN_FIRMWARE = {
