@@ -24,7 +24,7 @@ from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.run_watch import RunWatch
 from dcmp_hil.live.state import state_of
 from dcmp_hil.live.stop_command import stop_run
-from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed, doubts
 from dcmp_hil.platform.clock import MonotonicClock
 
@@ -77,7 +77,7 @@ class Server:
     """
 
     def __init__(self, setup: CommandSetup, mailbox: Mailbox, parent: int) -> None:
-        self._rig, self._knobs = setup.rig, knobs(setup.rig)
+        self._rig, self._tunables = setup.rig, tunable_descriptions(setup.rig)
         self._parent = parent
         self._mailbox = mailbox
         size = os.fstat(setup.ring).st_size
@@ -136,7 +136,7 @@ class Server:
         """Return where the run stands, and how old that is."""
         age = 1e-9 * (self._clock.now_ns() - self._newest_ns)
         state = state_of(self._ring.latest(), self._mailbox.phase, self._rig, age)
-        state |= {"pid": self._parent, "stopping": self._stopping is not None, "knobs": self._knobs}
+        state |= {"pid": self._parent, "stopping": self._stopping is not None, "knobs": self._tunables}
         return state
 
     def look(self) -> bool:
@@ -186,7 +186,7 @@ class Server:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
             return {"ok": False, "said": f"The run did not take it: {why}."}
         doubtful = doubts(self._rig, rig)
-        self._rig, self._knobs = rig, knobs(rig)
+        self._rig, self._tunables = rig, tunable_descriptions(rig)
         said = [f"{change.words}, applied at {answer.t:.3f} s", *(f"warning: {one}" for one in doubtful)]
         return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
 

@@ -36,7 +36,7 @@ _MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
 _NO_KIND = ("custom", "csv")
 
 
-def knobs(rig: Rig) -> list[dict[str, Any]]:
+def tunable_descriptions(rig: Rig) -> list[dict[str, Any]]:
     """Return what JSON can hold, in the order in which it is best shown."""
     return [_choice(rig, key) if key.endswith(".kind") else _number(rig, key) for key in settable(rig)]
 

@@ -1,1 +1,1 @@
-"""A page on this machine to turn a run's knobs with, and to stop it."""
+"""A page on this machine to change tunable keys of a run, and to stop it."""

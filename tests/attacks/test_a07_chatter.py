@@ -21,7 +21,7 @@ import pytest
 from dcmp_hil import TripError, load_rig, run
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.safety.chatter import FLOOR_V_S, Chatter, cause_of, limit_V_s
 from dcmp_hil.trip_request import Urgency
@@ -183,7 +183,7 @@ def test_the_rule_is_right_such_gains_do_end_a_run_where_it_is_got_round(
 @pytest.mark.parametrize("overrides", [(), ("encoder.counts_per_rev=1024", "loop.rate_hz=2000")])
 def test_sliders_end_where_the_loop_is_stable_and_quiet(overrides: tuple[str, ...]) -> None:
     rig = bench(*overrides)
-    for knob in knobs(rig):
+    for knob in tunable_descriptions(rig):
         if not knob["key"].startswith(("controller.", "observer.")) or "slider" not in knob:
             continue
         for end in knob["slider"]:
@@ -194,7 +194,7 @@ def test_sliders_end_where_the_loop_is_stable_and_quiet(overrides: tuple[str, ..
 
 
 def test_a_run_goes_on_at_the_ends_of_the_sliders() -> None:
-    for knob in knobs(bench()):
+    for knob in tunable_descriptions(bench()):
         if knob["key"].startswith(("controller.k", "observer.")) and "slider" in knob:
             for end in knob["slider"]:
                 result = ChangedRun({900: [f"{knob['key']}={end}"]}, duration=2.2).run()

@@ -9,7 +9,7 @@ import pytest
 from dcmp_hil.config.rig import Rig
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.tunable_ranges import knobs
+from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed, settable
 from tests.helpers import bench, named
 
@@ -94,7 +94,7 @@ def test_reference_of_a_file_gives_way_to_a_sine(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["sine", "chirp", "hold", "step", "trapezoid"])
 def test_knobs_are_what_is_settable_and_within_what_is_allowed(kind: str) -> None:
     rig = bench(f"reference.kind={kind}")
-    turned = knobs(rig)
+    turned = tunable_descriptions(rig)
     assert [knob["key"] for knob in turned] == settable(rig)
     for knob in turned:
         if "choices" in knob:
