@@ -70,7 +70,7 @@ class Summary:
     window_s: tuple[float, float]
 
 
-class Error:
+class ErrorStatistics:
     """Root mean square and maximum of a column that comes in pieces; NaN is left out."""
 
     def __init__(self) -> None:
@@ -152,7 +152,11 @@ class Statistics:
     def __init__(self, period: float, window_from: float = 0.0, window_to: float = math.inf) -> None:
         self._period = period
         self._from, self._to = window_from, window_to
-        self._tracking, self._velocity, self._disturbance = Error(), Error(), Error()
+        self._tracking, self._velocity, self._disturbance = (
+            ErrorStatistics(),
+            ErrorStatistics(),
+            ErrorStatistics(),
+        )
         self.period, self.lateness, self.compute = Durations(), Durations(), Durations()
         self._periods = self._late = 0
         self._peak = self._variation = 0.0
