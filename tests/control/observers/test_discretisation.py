@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.control.observers.discretisation import copy_step as series_step
 from dcmp_hil.control.observers.discretisation import luenberger_copy, matched_gains
-from tests.observers.matrix_observer import L1, L2, POLES, copy_step, gains, taylor
+from tests.control.observers.matrix_observer import L1, L2, POLES, copy_step, gains, taylor
 
 
 def test_copy_has_the_printed_digits_when_the_step_is_one_millisecond() -> None:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, bandwidth_floor, slope_bound
 from dcmp_hil.errors import ProtocolError
 from dcmp_hil.values import Estimate, Sample
+from tests.control.observers.matrix_observer import L1, L2, MatrixObserver
 from tests.helpers import T, setting, spoilt
-from tests.observers.matrix_observer import L1, L2, MatrixObserver
 
 _steps = st.lists(
     st.tuples(
