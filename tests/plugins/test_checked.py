@@ -83,7 +83,7 @@ def _check(trip: TripError, held: HeldRun, stage: str) -> None:
     assert not held.backend.live
     assert trip.cycles[-1].voltage == 0.0
     assert "tests.helpers:made_" in str(trip)
-    assert "(tests/test_checked.py, line " in str(trip)
+    assert "(tests/plugins/test_checked.py, line " in str(trip)
     assert "\n" not in str(trip)
     assert len(str(trip)) < 400
     result = held.session.result()
@@ -211,7 +211,7 @@ def test_backend_of_ones_own_that_raises_is_named(method: str) -> None:
 
     calls = [0]
     own = type("Own", (SimBackend,), {method: fail})
-    with pytest.raises(BackendError, match=r"by zero \(tests/test_checked\.py, line \d+\)") as caught:
+    with pytest.raises(BackendError, match=r"by zero \(tests/plugins/test_checked\.py, line \d+\)") as caught:
         run(bench(f"backend.kind={named(own)}"), duration=1.0, fast=True)
     assert "tests.helpers:made_" in str(caught.value)
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
@@ -222,7 +222,7 @@ def test_backend_of_ones_own_that_returns_no_sample_is_named(numbers: Any) -> No
     answer = Sample(*numbers) if numbers else (0.0, 0.0, 0.0)
     own = type("Own", (SimBackend,), {"read": lambda _: answer})
     with pytest.raises(
-        BackendError, match=r"read returned .* \(tests/test_checked\.py, line \d+\); expected"
+        BackendError, match=r"read returned .* \(tests/plugins/test_checked\.py, line \d+\); expected"
     ):
         run(bench(f"backend.kind={named(own)}"), duration=1.0, fast=True)
 
