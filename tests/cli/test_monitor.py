@@ -14,11 +14,11 @@ import pytest
 from dcmp_hil.device.factory import open_backend
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
-from tests.backends.line import line
 from tests.cli.ports import SAMPLE, way_to
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import PatientClock, on_bench
 from tests.contract.driving import drive
+from tests.device.line import line
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,12 +19,12 @@ from dcmp_hil.errors import OpenError
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
 from sim_backend.board.board import Board
-from tests.backends.line import line
 from tests.cli.ports import SAMPLE
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import on_bench
 from tests.contract.driving import drive
 from tests.contract.pump import Pump, VirtualBus
+from tests.device.line import line
 from tests.helpers import bench
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import pytest
 from dcmp_hil.wire import cobs, slcan
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import Health
-from tests.backends.line import line
 from tests.cli.test_wire_errors import device, only_line, path_of, start
+from tests.device.line import line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -15,7 +15,7 @@ from dcmp_hil.device.links.can import CanLink
 from dcmp_hil.device.links.serial import SerialLink
 from dcmp_hil.errors import ConfigError, DcmpError, OpenError
 from dcmp_hil.platform.clock import MonotonicClock
-from tests.backends.line import line
+from tests.device.line import line
 
 if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link
