@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.helpers import named
-from tests.replay.synthetic import swing, write
+from tests.offline.synthetic import swing, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable

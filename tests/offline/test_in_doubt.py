@@ -11,7 +11,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from dcmp_hil.offline.column_names import match
-from tests.replay.logged import COUNTS, DEG, HEADER, TOLERANCE, columns, figure, motion
+from tests.offline.logged import COUNTS, DEG, HEADER, TOLERANCE, columns, figure, motion
 
 if TYPE_CHECKING:
     from pathlib import Path

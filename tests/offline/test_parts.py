@@ -23,7 +23,7 @@ from dcmp_hil.offline import (
 )
 from dcmp_hil.offline.column_names import match
 from dcmp_hil.offline.resolution import equivalent_counts_per_rev
-from tests.replay.synthetic import swing
+from tests.offline.synthetic import swing
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
-from tests.replay.logged import (
+from tests.offline.logged import (
     EPOCH,
     HEADER,
     Cases,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.replay.logged import COUNTS, DEG, HEADER, Cases, Expect, check, columns, motion, usual
+from tests.offline.logged import COUNTS, DEG, HEADER, Cases, Expect, check, columns, motion, usual
 
 if TYPE_CHECKING:
     from pathlib import Path

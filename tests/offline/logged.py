@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import pytest
 
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
-from tests.replay.synthetic import Truth, swing
+from tests.offline.synthetic import Truth, swing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
-from tests.replay.synthetic import INERTIA, MODEL, Truth, swing, write
+from tests.offline.synthetic import INERTIA, MODEL, Truth, swing, write
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ReplayResult, ReplaySettings, replay
 from dcmp_hil.values import Estimate, Sample
-from tests.replay.synthetic import INERTIA, MODEL, Truth, lose, swing
+from tests.offline.synthetic import INERTIA, MODEL, Truth, lose, swing
 
 
 def true_error(truth: Truth, result: ReplayResult) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.replay.logged import (
+from tests.offline.logged import (
     DEG,
     EPOCH,
     HEADER,

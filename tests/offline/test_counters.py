@@ -10,7 +10,7 @@ import pytest
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, LoggedSignals, ReplaySettings, read_recording, replay
-from tests.replay.logged import COUNTS, HEADER, T, columns, figure, motion
+from tests.offline.logged import COUNTS, HEADER, T, columns, figure, motion
 
 if TYPE_CHECKING:
     from pathlib import Path
