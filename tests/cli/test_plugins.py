@@ -100,7 +100,7 @@ def test_library_is_never_replaced_by_a_file_beside_the_rig(script: Script, lab:
     assert _runs(lab) == []
 
 
-BROKEN = {  # tests/plugins/test_errors.py has more of them
+BROKEN = {  # tests/plugins/test_error_text.py has more of them
     "syntax": ("class Obs(:\n    pass\n", "mine.py, line 1: invalid syntax"),
     "at import": ("\nimport nothing_like_it\n", "(mine.py, line 2)"),
     "in init": (
