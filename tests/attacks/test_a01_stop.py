@@ -129,7 +129,7 @@ def _processes_of(folder: Path) -> list[int]:
     return found
 
 
-def test_stop_works_when_the_control_process_is_killed(tmp_path: Path) -> None:
+def test_stop_works_when_the_command_process_is_killed(tmp_path: Path) -> None:
     run_options = ("--viewer", "none", "--no-record", "--duration", "0", "--json", "figures.json")
     with started(tmp_path, "run", "bench-1khz", *run_options) as run:
         until_running(run)

@@ -11,7 +11,7 @@ from dcmp_hil.errors import ConfigError
 from tests.helpers import bench
 
 
-def test_terms_are_in_whole_units_and_signed_by_the_wiring() -> None:
+def test_config_is_in_whole_units_and_signed_by_the_wiring() -> None:
     config = DeviceConfig.of(
         bench(
             "backend.kind=serial",
@@ -48,6 +48,6 @@ def test_a_speed_limit_in_counts_is_the_rigs_and_one_count_in_8_ms(limit: float,
     assert 0.0 <= limit + math.tau / 4096 / 8e-3 - counts * config.rad_per_count < config.rad_per_count
 
 
-def test_terms_of_a_rig_without_a_wire_are_refused() -> None:
+def test_config_of_a_rig_without_a_wire_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"backend\.kind"):
         DeviceConfig.of(bench())

@@ -66,7 +66,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
     assert run_sockets.running() == []
 
 
-def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> None:
+def test_run_is_stopped_when_the_command_process_is_frozen(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         commands = command_process_of(run.pid)
@@ -81,7 +81,7 @@ def test_run_is_stopped_when_the_control_process_is_frozen(tmp_path: Path) -> No
     assert _gone(commands)
 
 
-def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path) -> None:
+def test_run_goes_on_and_warns_when_the_command_process_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         os.kill(command_process_of(run.pid), signal.SIGKILL)
@@ -95,7 +95,7 @@ def test_run_goes_on_and_warns_when_the_control_process_is_killed(tmp_path: Path
     assert sum("The command process ended" in trouble for trouble in figures["troubles"]) == 1
 
 
-def test_control_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
+def test_command_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         commands = command_process_of(run.pid)
