@@ -149,7 +149,7 @@ def make_supervisor(
     """Make the supervisor with the checks that `[supervisor]` asks for, behind those that come first."""
     chatter = chatter or make_chatter(rig)
     limits = rig.supervisor
-    clamps = make_limiter(rig, notify)
+    limiter = make_limiter(rig, notify)
     checks: list[Check] = [*first, FiniteMonitor()]
     if limits.monitors == "all":
         setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
@@ -159,7 +159,7 @@ def make_supervisor(
         independent = RangeMonitor(position, velocity, spare, "the supervisor's own observer")
         second = DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent)
         chatter.samples = second.samples
-        clamps.watch_variation(chatter)
+        limiter.watch_variation(chatter)
         checks += [RangeMonitor(position, velocity, spare), second]
     immediate = limits.start == "immediate"
     probe = (
@@ -169,7 +169,7 @@ def make_supervisor(
     )
     return Supervisor(
         checks,
-        clamps,
+        limiter,
         settle=0.0 if immediate else _SETTLING_TIME_S,
         engage=0.0 if immediate else _ENGAGING_TIME_S,
         notify=notify,

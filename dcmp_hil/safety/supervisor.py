@@ -81,8 +81,8 @@ class Supervisor:
     ----------
     checks
         Asked every cycle, in this order; the first objection is the cause.
-    limits
-        Clamps on what the line asks for, and the check of them.
+    limiter
+        Bounds what the loop asks for; its own check comes last.
     settle, engage
         s, the lengths of these two phases; 0 and 0 for an immediate start.
     notify
@@ -92,10 +92,10 @@ class Supervisor:
 
     Attributes
     ----------
-    limits
+    limiter
         As given.
     limit_reference
-        What of a reference they allow.
+        What of a reference the limiter allows.
     phase
         Where the run stands.
     stopping
@@ -105,7 +105,7 @@ class Supervisor:
     def __init__(
         self,
         checks: Sequence[Check],
-        limits: Limiter,
+        limiter: Limiter,
         *,
         settle: float,
         engage: float,
@@ -113,9 +113,9 @@ class Supervisor:
         probe: PolarityCheck | None = None,
     ) -> None:
         self._checks = tuple(one.check for one in checks)
-        self.limits = limits
-        self._check_limits, self._limited = limits.check, limits.limit_voltage
-        self.limit_reference = limits.limit_reference
+        self.limiter = limiter
+        self._check_limits, self._limited = limiter.check, limiter.limit_voltage
+        self.limit_reference = limiter.limit_reference
         self._settle, self._engage = settle, engage
         self._notify = notify
         self._probe = probe
@@ -204,7 +204,7 @@ class Supervisor:
         elif self._probe.over:
             self._advance(PhaseEvent.PROBED, sample.t)
         else:
-            most = self.limits.voltage_limit
+            most = self.limiter.voltage_limit
             self._push = max(-most, min(most, self._probe.voltage))
 
     def _leave_phase(self, t: float) -> None:
@@ -223,12 +223,12 @@ class Supervisor:
             return self._push
         gone, most = t - self._since, 0.0
         if self.phase is Phase.ENGAGING and gone > 0.0:  # at 0 an infinite limit would give NaN
-            most = self.limits.voltage_limit * gone / self._engage
+            most = self.limiter.voltage_limit * gone / self._engage
         elif self.phase is Phase.STOPPING:
             most = self._stop_from * (1.0 - gone / _RAMP_TIME_S)
         if not most > 0.0:
             return 0.0
-        return self.limits.limit_slew(max(-most, min(most, demand)), self._last)
+        return self.limiter.limit_slew(max(-most, min(most, demand)), self._last)
 
     def _advance(self, event: PhaseEvent, t: float) -> None:
         following = TABLE[self.phase].get(event)

@@ -33,8 +33,8 @@ def _supervisor(
     slew: float = math.inf,
 ) -> tuple[Supervisor, list[Event]]:
     events: list[Event] = []
-    limits = Limiter(voltage=limit, slew=slew, period=_PERIOD, notify=events.append)
-    made = Supervisor(monitors, limits, settle=settle, engage=engage, notify=events.append)
+    limiter = Limiter(voltage=limit, slew=slew, period=_PERIOD, notify=events.append)
+    made = Supervisor(monitors, limiter, settle=settle, engage=engage, notify=events.append)
     return made, events
 
 
@@ -89,14 +89,14 @@ def test_supervisor_never_lets_more_than_the_limit_through(limit: float, demand:
     supervisor, _ = _supervisor(limit=limit, settle=0.0, engage=0.0)
     _, voltage = _period(supervisor, 0.0, demand)
     assert voltage == max(-limit, min(limit, demand))
-    assert supervisor.limits.clamped == (abs(demand) > limit)
+    assert supervisor.limiter.clamped == (abs(demand) > limit)
 
 
 @pytest.mark.parametrize("demand", [10.0, -10.0])
 def test_supervisor_does_not_call_the_limit_itself_clamped(demand: float) -> None:
     supervisor, events = _supervisor(settle=0.0, engage=0.0)
     assert _period(supervisor, 0.0, demand)[1] == demand
-    assert supervisor.limits.clamped == 0
+    assert supervisor.limiter.clamped == 0
     assert not [event for event in events if event.level == "WARN"]
 
 
@@ -106,14 +106,14 @@ def test_supervisor_says_it_once_a_second_when_it_clamps() -> None:
         _period(supervisor, k * _PERIOD, 11.0 if k % 256 > 3 else 0.0)  # in a row it would end the run
     warnings = [event.t for event in events if event.level == "WARN"]
     assert warnings == [4 * _PERIOD, 1.0 + 4 * _PERIOD, 2.0 + 4 * _PERIOD]
-    assert supervisor.limits.clamped == 3 * (1024 - 16)
+    assert supervisor.limiter.clamped == 3 * (1024 - 16)
 
 
 def test_supervisor_is_silent_when_the_growing_limit_bites() -> None:
     supervisor, events = _supervisor()
     for k in range(512):
         _period(supervisor, k * _PERIOD, 1.0)
-    assert supervisor.limits.clamped == 0
+    assert supervisor.limiter.clamped == 0
     assert {event.kind for event in events} == {EventKind.PHASE}
 
 
@@ -223,42 +223,42 @@ def test_supervisor_limits_the_slew_in_every_phase() -> None:
     assert said[0].startswith("slew limited")
 
 
-def _bound(limits: Limiter, reference: Reference, t: float = 0.0, position: float = 0.0) -> Reference:
-    return limits.limit_reference(Sample(t, position, 0.0), reference)
+def _bound(limiter: Limiter, reference: Reference, t: float = 0.0, position: float = 0.0) -> Reference:
+    return limiter.limit_reference(Sample(t, position, 0.0), reference)
 
 
 def test_limits_hold_the_reference_short_of_where_the_supervisor_trips() -> None:
     events: list[Event] = []
-    limits = Limiter(voltage=10.0, period=_PERIOD, notify=events.append, position=1.9, velocity=9.5)
+    limiter = Limiter(voltage=10.0, period=_PERIOD, notify=events.append, position=1.9, velocity=9.5)
     inside = Reference(1.9, -0.1, 40.0)
-    assert _bound(limits, inside) is inside
+    assert _bound(limiter, inside) is inside
     assert not events
-    assert abs(_bound(limits, Reference(-2.5, -1.0, 3.0), t=_PERIOD).position) <= 1.9
-    assert abs(_bound(limits, Reference(1.0, 12.0, 3.0), t=2 * _PERIOD).velocity) <= 9.5
+    assert abs(_bound(limiter, Reference(-2.5, -1.0, 3.0), t=_PERIOD).position) <= 1.9
+    assert abs(_bound(limiter, Reference(1.0, 12.0, 3.0), t=2 * _PERIOD).velocity) <= 9.5
     assert [event.text for event in events] == [
         "reference limited to 1.9 rad: it asks for -2.5",
         "reference's velocity limited to 9.5 rad/s: it asks for 12",
     ]
-    _bound(limits, Reference(2.5, 1.0, 3.0), t=0.9)
+    _bound(limiter, Reference(2.5, 1.0, 3.0), t=0.9)
     assert len(events) == 2  # once a second
 
 
 @pytest.mark.parametrize("field", ["position", "velocity"])
 def test_limits_leave_nan_in_the_reference_for_the_demand_to_show(field: str) -> None:
-    limits = Limiter(
+    limiter = Limiter(
         voltage=10.0, period=_PERIOD, notify=lambda _: None, position=1.9, velocity=9.5, error=1.0
     )
-    assert math.isnan(getattr(_bound(limits, Reference(0.0, 0.0, 0.0)._replace(**{field: math.nan})), field))
+    assert math.isnan(getattr(_bound(limiter, Reference(0.0, 0.0, 0.0)._replace(**{field: math.nan})), field))
 
 
 def test_limits_want_an_end_when_the_arm_stays_off_the_reference() -> None:
-    limits = Limiter(voltage=10.0, period=_PERIOD, notify=lambda _: None, error=0.5)
+    limiter = Limiter(voltage=10.0, period=_PERIOD, notify=lambda _: None, error=0.5)
     for k in range(200):  # less than half a second, again and again
         for late in range(100):
-            _bound(limits, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)
-    assert limits.check(_ANY, _AT_REST) is None
+            _bound(limiter, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)
+    assert limiter.check(_ANY, _AT_REST) is None
     for late in range(513):
-        _bound(limits, Reference(-0.6, 0.0, 0.0), t=1e3 + late * _PERIOD)
-    stop = limits.check(_ANY, _AT_REST)
+        _bound(limiter, Reference(-0.6, 0.0, 0.0), t=1e3 + late * _PERIOD)
+    stop = limiter.check(_ANY, _AT_REST)
     assert stop is not None
     assert (stop.reason, stop.urgency) == ("tracking", Urgency.RAMP)

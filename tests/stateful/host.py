@@ -37,9 +37,9 @@ class Host:
     def __init__(self, backend: DeviceBackend, judge: Judge, session: int) -> None:
         self.backend, self.judge, self.session = backend, judge, session
         self.objector = Objector()
-        limits = Limiter(voltage=MOST, period=PERIOD, notify=self._notified)
+        limiter = Limiter(voltage=MOST, period=PERIOD, notify=self._notified)
         monitors = (FiniteMonitor(), self.objector)
-        self.supervisor = Supervisor(monitors, limits, settle=SETTLE, engage=ENGAGE, notify=self._notified)
+        self.supervisor = Supervisor(monitors, limiter, settle=SETTLE, engage=ENGAGE, notify=self._notified)
         self.sample = Sample(-math.inf, 0.0, 0.0)
         self._phase, self._since = Phase.ARMING, 0.0
 
