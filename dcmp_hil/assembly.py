@@ -71,7 +71,7 @@ def assemble(
         If a class named `module:Class` cannot be found or made.
     """
     backend = open_backend(rig, clock, faults, clear=clear)
-    trajectory = Trajectory(rig.reference, rig.reference.soft_start_s)
+    trajectory = Trajectory(rig.reference.source(), rig.reference.soft_start_s)
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,

@@ -118,8 +118,10 @@ def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
         previous = arrived
         changes.apply(t)
 
-        over = supervisor.check(t, deadline_monitor.check(timing))
-        if over is not None:
-            raise over.error()
+        late = deadline_monitor.check(timing)
+        if supervisor.over is not None:  # 0 V has been sent
+            raise supervisor.over.error()
+        if late is not None:
+            supervisor.stop(late, t)
         if (t >= until or stop.requested) and not supervisor.stopping:
             return t

@@ -11,10 +11,9 @@ import pytest
 from dcmp_hil import loop, run
 from dcmp_hil.errors import TripError
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.trip_request import TripRequest
-from dcmp_hil.values import Cycle, Estimate, Reference, Sample
+from dcmp_hil.values import Cycle, Estimate, Reference, Sample, Timing
 from tests.helpers import STEADY, T, bench
 
 if TYPE_CHECKING:
@@ -28,16 +27,22 @@ class _Stages:
         self.calls: list[tuple[str, tuple[Any, ...]]] = []
         self.clock = clock
         self.over: TripRequest | None = None
-        self.trip_at = 10**9
+        self.trip_at = self.late_at = 10**9
+        self.timings: list[Timing] = []
         self._samples = iter(samples)
         self._tick = -1
 
-    def stage(self, names: dict[str, Callable[..., Any]]) -> Any:
+    def stage(self, names: dict[str, Callable[..., Any]], over: Callable[[], object] = lambda: None) -> Any:
         """Make one stage: its methods, and what they answer."""
         calls = self.calls
 
         class Stage:
             stopping = False
+
+            @property
+            def over(self) -> object:
+                calls.append(("over", ()))
+                return over()
 
             def __getattr__(self, name: str) -> Callable[..., Any]:
                 def call(*arguments: Any) -> Any:
@@ -58,6 +63,10 @@ class _Stages:
             self.over = TripRequest("because", "Seen.", "Look.")
             return 0.0
         return 6.0
+
+    def deadline(self, timing: Timing) -> TripRequest | None:
+        self.timings.append(timing)
+        return TripRequest("late", "Late.", "Look.", late=True) if self._tick == self.late_at else None
 
     def line(self) -> loop.LoopStages:
         """Make the line."""
@@ -81,11 +90,12 @@ class _Stages:
                     "engages": lambda _: self._tick == 1,
                     "limit_reference": lambda _, reference: reference,
                     "safe_voltage": self.safe_voltage,
-                    "check": lambda _, __: self.over,
-                }
+                    "stop": lambda _, __: None,
+                },
+                over=lambda: self.over,
             ),
             telemetry=self.stage({"record": lambda _: None}),
-            deadline_monitor=DeadlineMonitor(1e-3),
+            deadline_monitor=self.stage({"check": self.deadline}),
             clock=clock,
             delay=0.001,
         )
@@ -107,11 +117,11 @@ def _stages(trip_at: int = 10**9) -> tuple[_Stages, loop.LoopStages]:
 def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     stages, line = _stages()
     assert loop.run(line, _SAMPLES[1].t, _Stop()) == _SAMPLES[1].t
-    second = stages.calls[[name for name, _ in stages.calls].index("check") + 1 :]  # which has "begin"
+    second = stages.calls[[name for name, _ in stages.calls].index("over") + 1 :]  # which has "begin"
     names = [name for name, _ in second]
     assert names == [
         "read", "update", "engages", "begin", "ahead", "at", "limit_reference", "update", "safe_voltage",
-        "write", "sent", "record", "check",
+        "write", "sent", "record", "check", "over",
     ]  # fmt: skip
     given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
     sample, estimate = _SAMPLES[1], Estimate(0.25, 0.0, 0.0)
@@ -126,6 +136,7 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     assert given[9] == given[10] == (6.0,)
     cycle: Cycle = given[11][0]
     assert cycle[:5] == (sample, estimate, reference, 5.0, 6.0)
+    assert stages.timings[1] == cycle.timing
 
 
 def test_loop_times_its_periods() -> None:
@@ -149,9 +160,19 @@ def test_loop_writes_zero_and_records_the_period_before_it_raises_a_trip() -> No
     stages, line = _stages(trip_at=2)
     with pytest.raises(TripError, match="Seen"):
         loop.run(line, _SAMPLES[2].t, _Stop())  # tripping wins over the end
-    assert [name for name, _ in stages.calls][-4:] == ["write", "sent", "record", "check"]
-    assert stages.calls[-4] == ("write", (0.0,))
-    assert stages.calls[-2][1][0].voltage == 0.0
+    assert [name for name, _ in stages.calls][-6:] == ["write", "sent", "record", "check", "over", "over"]
+    assert stages.calls[-6] == ("write", (0.0,))
+    assert stages.calls[-4][1][0].voltage == 0.0
+
+
+def test_loop_hands_a_late_period_to_the_supervisor_behind_the_end_that_is_due() -> None:
+    stages, line = _stages()
+    stages.late_at = 1
+    loop.run(line, _SAMPLES[3].t, _Stop())
+    first = [name for name, _ in stages.calls].index("stop")
+    assert [name for name, _ in stages.calls[first - 2 : first]] == ["check", "over"]
+    assert stages.calls[first][1] == (TripRequest("late", "Late.", "Look.", late=True), _SAMPLES[1].t)
+    assert [name for name, _ in stages.calls].count("stop") == 1
 
 
 @pytest.mark.parametrize("delay", [0, 1])

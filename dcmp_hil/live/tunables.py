@@ -134,7 +134,7 @@ def _worked_out(before: Rig, after: Rig) -> Change:
         tuning = after.observer.tuning(
             observers.ObserverContext(after.model.values(), after.period, after.encoder.counts)
         )
-    reference = after.reference if after.reference != before.reference else None
+    reference = after.reference.source() if after.reference != before.reference else None
     values = _different(before, after)
     words = _in_words(before, values)
     return Change(words, values, gains, tuning, reference, expected_variation(after))

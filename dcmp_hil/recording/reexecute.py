@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.control.references import ReferenceSource
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.values import Estimate, Event
 
@@ -75,7 +74,7 @@ def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
     if not trust:
         refuse_named(recorded, rig)
     check_numbers(recorded)
-    source: ReferenceSource = rig.reference
+    source = rig.reference.source()
     if isinstance(rig.reference, Table) and not trust and rig.reference == recorded.rig.reference:
         source = UnreadTable(recorded.path, rig.reference)
     trajectory = Trajectory(source, rig.reference.soft_start_s)

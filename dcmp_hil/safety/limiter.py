@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dcmp_hil.safety.chatter import Chatter
-    from dcmp_hil.values import Estimate, Sample
+    from dcmp_hil.values import Sample
 
 _SAID_EVERY = 1.0  # s, each limit
 _SATURATION_TIME_MAX_S = 0.5  # s in a row at a limit of the voltage that end the run
@@ -67,6 +67,8 @@ class Limiter:
         V, either way.
     clamped
         Periods in which the demand was more than the limits allowed.
+    objection
+        Why the run should end: a limit that has acted for too long, or chatter; None while it may go on.
     """
 
     def __init__(
@@ -89,7 +91,7 @@ class Limiter:
         bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
         self._governor = ReferenceGovernor(bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
-        self._stop: TripRequest | None = None
+        self.objection: TripRequest | None = None
         self._slews = slew < math.inf
         self._said: dict[str, float] = {}
         self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _IN_A_ROW * period)
@@ -105,9 +107,10 @@ class Limiter:
 
     def limit_reference(self, sample: Sample, reference: Reference) -> Reference:
         """Return the reference, or what of it is allowed; NaN stays, and trips as the demand."""
-        error, most = reference.position - sample.position, self._error
-        governed = self._governor.bound(sample.t, reference) if self._governor else reference
-        if governed is reference and -most <= error <= most:
+        t, position, _, _ = sample
+        governed = self._governor.bound(t, reference) if self._governor else reference
+        x, _, _ = reference
+        if governed is reference and -self._error <= x - position <= self._error:
             return reference
         return self._judged(sample, reference, governed)
 
@@ -122,24 +125,20 @@ class Limiter:
             self._judge_variation(t)
         return demand
 
-    def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:  # noqa: ARG002 - as every check
-        """Object if a limit has acted for too long up to this period."""
-        return self._stop
-
     def limit_slew(self, voltage: float, last: float) -> float:
         """Return the voltage, or the nearest that the slew allows after `last` V."""
         return max(last - self._step, min(last + self._step, voltage))
 
     def _judge_variation(self, t: float) -> None:
         assert self._chatter is not None  # noqa: S101 - without one, no block ends
-        self._stop = self._stop or self._chatter.judge(t, self._change)
+        self.objection = self.objection or self._chatter.judge(t, self._change)
         self._change, self._left = 0.0, self._chatter.block
 
     def _judged(self, sample: Sample, asked: Reference, reference: Reference) -> Reference:
         """Report a limited reference; stop if the arm is too far from the governed one."""
         x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
-            self._stop = TripRequest(
+            self.objection = TripRequest(
                 "tracking",
                 f"The arm has been more than {self._error:g} rad off the reference for "
                 f"{_TRACKING_ERROR_TIME_MAX_S:g} s (reference {x:.2f} rad, position {sample.position:.2f} "
@@ -180,7 +179,7 @@ class Limiter:
     def _note_clamp(self, t: float, demand: float) -> None:
         self.clamped += 1
         if self._saturated.too_long(t):
-            self._stop = TripRequest(
+            self.objection = TripRequest(
                 "saturation",
                 f"The controller has asked for more than it may have for {_SATURATION_TIME_MAX_S:g} s "
                 f"({demand:.1f} V at t = {t:.3f} s, {self.voltage_limit:g} V allowed).",

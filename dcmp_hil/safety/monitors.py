@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample
 
 _HEALTHY = Fault.NONE  # found here faster than in its class
+_MINUS_INF, _INF = -math.inf, math.inf
 
 
 class FiniteMonitor:
@@ -31,7 +32,7 @@ class FiniteMonitor:
             sentence, remedy = meaning_of(fault)
             return TripRequest("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
         x1, x2, w = estimate
-        if not -math.inf < t + position + voltage + x1 + x2 + w < math.inf:  # a sum with a NaN is one
+        if not _MINUS_INF < t + position + voltage + x1 + x2 + w < _INF:  # a sum with a NaN is one
             return TripRequest(
                 "not_finite",
                 f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
@@ -54,28 +55,34 @@ class RangeMonitor:
         rad/s, what an estimate may show more than the limit: less than that is the encoder's own step.
     seen_by
         Whose estimate it is, for the sentence.
+
+    Attributes
+    ----------
+    velocity_max
+        rad/s, either way: what an estimate may show.
     """
 
     def __init__(
         self, position: float, velocity: float, spare: float = 0.0, seen_by: str = "the run's observer"
     ) -> None:
         self._position = position
-        self._velocity, self._most, self._seen_by = velocity, velocity + spare, seen_by
+        self._velocity, self.velocity_max, self._seen_by = velocity, velocity + spare, seen_by
 
     def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
         """Object outside the limits."""
-        if not -self._most <= estimate.velocity <= self._most:
+        t, position, _, _ = sample
+        _, velocity, _ = estimate
+        if not -self.velocity_max <= velocity <= self.velocity_max:
             return TripRequest(
                 "speed",
-                f"Estimated velocity {estimate.velocity:.2f} rad/s at t = {sample.t:.3f} s, by "
+                f"Estimated velocity {velocity:.2f} rad/s at t = {t:.3f} s, by "
                 f"{self._seen_by}; the limit is {self._velocity:g} rad/s.",
                 "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
             )
-        if not -self._position <= sample.position <= self._position:
+        if not -self._position <= position <= self._position:
             return TripRequest(
                 "travel",
-                f"Position {sample.position:.2f} rad at t = {sample.t:.3f} s; "
-                f"the limit is {self._position:g} rad.",
+                f"Position {position:.2f} rad at t = {t:.3f} s; the limit is {self._position:g} rad.",
                 "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
             )
         return None
@@ -112,6 +119,7 @@ class DisturbanceWatch:
         ranges: RangeMonitor | None = None,
     ) -> None:
         self._ranges = ranges
+        self._velocity_max = ranges.velocity_max if ranges else math.inf
         self._diagnosis = Diagnosis(setting)
         self._remember, self._update = self._diagnosis.add, observer.update
         self._keep = math.exp(-setting.period / 10e-3)
@@ -131,11 +139,9 @@ class DisturbanceWatch:
         The stop for a disturbance can find the likely cause.
         """
         self._remember(sample)
-        seen = self._update(sample)
-        outside = self._ranges.check(sample, seen) if self._ranges else None
-        if outside is not None:
-            return outside
-        w = seen.disturbance
+        _, velocity, w = seen = self._update(sample)
+        if not -self._velocity_max <= velocity <= self._velocity_max and self._ranges is not None:
+            return self._ranges.check(sample, seen)
         self._filtered = filtered = w + self._keep * (self._filtered - w)
         if -self._limit <= filtered <= self._limit:
             self._above = 0

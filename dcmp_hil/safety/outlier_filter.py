@@ -46,8 +46,9 @@ class OutlierFilter:
     def reject(self, sample: Sample) -> bool:
         """Return whether to read on: this sample's position is off, and may be left out."""
         self._samples += 1
-        if -self._usual <= sample.position - self._x <= self._usual:
-            self._t, self._x, _, _ = sample
+        t, x, _, _ = sample
+        if -self._usual <= x - self._x <= self._usual:
+            self._t, self._x = t, x
             return False
         return self._is_off(sample)
 

@@ -71,6 +71,7 @@ TABLE: Mapping[Phase, Mapping[PhaseEvent, Phase]] = {
 }
 """What follows what; an event that is not listed changes nothing. Nothing leads out of TRIPPED."""
 
+_MINUS_INF, _INF = -math.inf, math.inf
 _RAMP_TIME_S = 0.05  # s that an orderly end takes to 0 V
 
 
@@ -99,7 +100,9 @@ class Supervisor:
     phase
         Where the run stands.
     stopping
-        Whether an orderly end is under way: in a few periods `check` says that the run is over.
+        Whether an orderly end is under way: in a few periods the run is over.
+    over
+        Why the run is over; None while it is not. The loop has sent 0 V before it looks, and ends then.
     """
 
     def __init__(
@@ -114,7 +117,7 @@ class Supervisor:
     ) -> None:
         self._checks = tuple(one.check for one in checks)
         self.limiter = limiter
-        self._check_limits, self._limited = limiter.check, limiter.limit_voltage
+        self._limited = limiter.limit_voltage
         self.limit_reference = limiter.limit_reference
         self._settle, self._engage = settle, engage
         self._notify = notify
@@ -125,7 +128,7 @@ class Supervisor:
         self._last = 0.0  # V, what was sent last
         self._stop_from = 0.0  # V, where an orderly end begins
         self._cause: TripRequest | None = None
-        self._over: TripRequest | None = None
+        self.over: TripRequest | None = None
         self._has_authority = False  # in RUNNING; asked every cycle
         self.phase = Phase.ARMING
         self.stopping = False
@@ -152,42 +155,30 @@ class Supervisor:
         """Return the voltage to send, V.
 
         Once a check has objected with `Urgency.NOW`, or the demand was no finite number, it is 0 V for good,
-        and `check` says why: the loop sends that 0 V, records the period, and ends. After an objection with
+        and `over` says why: the loop sends that 0 V, records the period, and ends. After an objection with
         `Urgency.RAMP`, such as that of a limit that has acted for too long, it takes 50 ms to get there.
         """
+        t = sample.t
         for check in self._checks:
             objection = check(sample, estimate)
             if objection is not None:
-                self.stop(objection, sample.t)
+                self.stop(objection, t)
                 break
         try:
-            if not -math.inf < demand < math.inf:
-                self.stop(_not_finite(sample, demand), sample.t)
+            if not _MINUS_INF < demand < _INF:
+                self.stop(_not_finite(sample, demand), t)
         except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
             raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
         if not self._has_authority:
-            self._leave_phase(sample.t)
+            self._leave_phase(t)
         self._last = voltage = (
-            self._limited(sample.t, demand, self._last)
-            if self._has_authority
-            else self._partial_voltage(sample.t, demand)
+            self._limited(t, demand, self._last) if self._has_authority else self._partial_voltage(t, demand)
         )
-        objection = self._check_limits(sample, estimate)
-        if objection is not None:
-            self.stop(objection, sample.t)
-            if self._over is not None:  # without authority there is nothing to lead to 0 V
+        if self.limiter.objection is not None:
+            self.stop(self.limiter.objection, t)
+            if self.over is not None:  # without authority there is nothing to lead to 0 V
                 self._last = voltage = 0.0
         return voltage
-
-    def check(self, t: float, late: TripRequest | None) -> TripRequest | None:
-        """Return why the run is over, None if it is not; then take what was wrong with the period's timing.
-
-        In that order: the loop has sent 0 V before it ends.
-        """
-        over = self._over
-        if late is not None:
-            self.stop(late, t)
-        return over
 
     def stop(self, cause: TripRequest, t: float) -> None:
         """Begin to end the run in the period of device time `t` (s); the first cause wins."""
@@ -238,7 +229,7 @@ class Supervisor:
         self._has_authority = following is Phase.RUNNING
         self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
         if following is Phase.TRIPPED and self._cause is not None:
-            self._over = self._cause._replace(orderly=event is PhaseEvent.STOPPED)
+            self.over = self._cause._replace(orderly=event is PhaseEvent.STOPPED)
         self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
 
 

@@ -87,7 +87,7 @@ def test_reference_of_a_file_gives_way_to_a_sine(tmp_path: Path) -> None:
     rig = bench("reference.kind=csv", f"reference.file={file}")
     assert changed(rig, ["controller.kp_1_s2=5000"])[1].reference is None
     after, change = changed(rig, ["reference.kind=sine", "reference.amplitude_rad=0.3"])
-    assert change.reference == after.reference
+    assert change.reference == after.reference.source()
     assert "reference.kind" in change.words
 
 

@@ -157,7 +157,7 @@ def test_the_rigs_monitors_trip_in_the_same_period_when_anything_is_not_finite(
     else:
         sample = spoilt(sample, field, bad)
     assert supervisor.safe_voltage(sample, estimate, 1.0) == 0.0
-    over = supervisor.check(sample.t, None)
+    over = supervisor.over
     assert over is not None
     assert (over.reason, over.orderly) == ("not_finite", False)
 
@@ -175,4 +175,4 @@ def test_the_rigs_limits_reach_the_monitors(
     for overrides, expected in (((f"supervisor.{key}",), reason), ((), None)):
         supervisor = make_supervisor(bench(*overrides), lambda _: None)
         supervisor.safe_voltage(sample, estimate, 0.0)
-        assert getattr(supervisor.check(0.0, None), "reason", None) == expected
+        assert getattr(supervisor.over, "reason", None) == expected

@@ -38,8 +38,12 @@ def _supervisor(
     return made, events
 
 
+def _objection(limiter: Limiter) -> TripRequest | None:
+    return limiter.objection
+
+
 def _reason(supervisor: Supervisor) -> str:
-    over = supervisor.check(math.inf, None)
+    over = supervisor.over
     assert over is not None
     return over.reason
 
@@ -132,7 +136,7 @@ def test_supervisor_stays_at_zero_volts_once_a_monitor_objected() -> None:
     assert _period(supervisor, 1.0, 3.0)[1] == 0.0
     monitor.at = math.inf  # the fault is gone
     assert _period(supervisor, 1.1, 3.0)[1] == 0.0
-    assert supervisor.check(math.inf, None) is not None
+    assert supervisor.over is not None
 
 
 def test_supervisor_keeps_the_first_cause() -> None:
@@ -154,13 +158,13 @@ def test_supervisor_trips_while_it_settles_too() -> None:
     supervisor, _ = _supervisor(_Objects(0.1))
     for t in (0.0, 0.1):
         _period(supervisor, t, 0.0)
-    assert supervisor.check(math.inf, None) is not None
+    assert supervisor.over is not None
 
 
 def _reasons_of(supervisor: Supervisor, demand: float, seconds: float) -> list[tuple[float, float]]:
     """Run periods until it trips; return device times and voltages."""
     seen: list[tuple[float, float]] = []
-    while supervisor.check(0.0, None) is None and len(seen) < seconds / _PERIOD:
+    while supervisor.over is None and len(seen) < seconds / _PERIOD:
         t = len(seen) * _PERIOD
         seen.append((t, _period(supervisor, t, demand)[1]))
     return seen
@@ -191,9 +195,8 @@ def test_supervisor_goes_to_zero_at_once_when_a_fault_comes_into_an_orderly_end(
 def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: float) -> None:
     supervisor, _ = _supervisor(settle=0.0, engage=0.0)
     assert _period(supervisor, 0.0, -6.0)[1] == -6.0
-    assert (
-        supervisor.check(0.0, TripRequest("late", "Seen.", "Look.", Urgency.RAMP)) is None
-    )  # 0 V is sent first
+    supervisor.stop(TripRequest("late", "Seen.", "Look.", Urgency.RAMP), 0.0)
+    assert supervisor.over is None
     assert supervisor.stopping
     for k in range(1, 60):
         most = 6.0 * max(0.0, 1.0 - (k * _PERIOD) / 0.05)
@@ -205,9 +208,7 @@ def test_supervisor_lets_no_more_through_than_at_first_while_it_stops(demand: fl
 def test_supervisor_trips_at_once_when_an_orderly_end_is_asked_for_without_authority() -> None:
     supervisor, _ = _supervisor()
     _period(supervisor, 0.0, 1.0)
-    assert (
-        supervisor.check(0.0, TripRequest("late", "Seen.", "Look.", Urgency.RAMP)) is None
-    )  # 0 V is sent first
+    supervisor.stop(TripRequest("late", "Seen.", "Look.", Urgency.RAMP), 0.0)
     assert _reason(supervisor) == "late"
 
 
@@ -256,9 +257,9 @@ def test_limits_want_an_end_when_the_arm_stays_off_the_reference() -> None:
     for k in range(200):  # less than half a second, again and again
         for late in range(100):
             _bound(limiter, Reference(0.6, 0.0, 0.0), t=(k * 300 + late) * _PERIOD)
-    assert limiter.check(_ANY, _AT_REST) is None
+    assert _objection(limiter) is None
     for late in range(513):
         _bound(limiter, Reference(-0.6, 0.0, 0.0), t=1e3 + late * _PERIOD)
-    stop = limiter.check(_ANY, _AT_REST)
+    stop = _objection(limiter)
     assert stop is not None
     assert (stop.reason, stop.urgency) == ("tracking", Urgency.RAMP)

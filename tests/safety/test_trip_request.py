@@ -19,7 +19,7 @@ from dcmp_hil.safety.monitors import FiniteMonitor, RangeMonitor
 from dcmp_hil.safety.polarity_check import PolarityCheck
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.trip_request import TripRequest, Urgency
-from dcmp_hil.values import Estimate, Sample, Timing
+from dcmp_hil.values import Estimate, Reference, Sample, Timing
 from tests.helpers import T, bench
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ def _checks() -> list[Check]:
         FiniteMonitor(),
         RangeMonitor(1.0, 1.0),
         make_outlier_filter(rig),
-        make_limiter(rig, lambda _: None),
     ]
     return [*made, CheckedObserver(_Broken(), "a:B"), CheckedController(_Broken(), "a:B")]
 
@@ -62,6 +61,15 @@ def test_probe_and_deadlines_raise_nothing_either() -> None:
             overruns.check(Timing(t, position, voltage)),
         ):
             assert stop is None or isinstance(stop, TripRequest)
+
+
+def test_the_limiter_raises_nothing_either() -> None:
+    limiter = make_limiter(bench("amplifier.slew_V_s=100"), lambda _: None)
+    for t, demand, last in product(ODD, repeat=3):
+        assert isinstance(limiter.limit_voltage(t, demand, last), float)
+    for t, position, x in product(ODD, ODD, (math.nan, math.inf, -math.inf)):
+        limiter.limit_reference(Sample(t, position, 0.0), Reference(x, 0.0, 0.0))
+    assert limiter.objection is None or isinstance(limiter.objection, TripRequest)
 
 
 def test_no_room_of_safety_raises_a_trip_or_calls_back() -> None:
@@ -88,7 +96,9 @@ def test_each_urgency_ends_each_phase_in_its_bound_and_with_0_V(phase: Phase, ur
         late = None
         if asked_at is None and k > 0 and supervisor.phase is phase:
             asked_at, late = k, asked
-        over = supervisor.check(k * T, late)
+        over = supervisor.over
+        if late is not None:
+            supervisor.stop(late, k * T)
         k += 1
         assert k < 2000
     assert asked_at is not None
@@ -105,7 +115,8 @@ def test_the_first_cause_wins_and_is_told_as_an_error() -> None:
     supervisor = make_supervisor(bench(), lambda _: None)
     supervisor.stop(TripRequest("first", "One.", "Look."), 0.0)
     supervisor.stop(TripRequest("second", "Two.", "Look.", Urgency.RAMP), 0.0)
-    over = supervisor.check(0.0, TripRequest("third", "Three.", "Look.", late=True))
+    supervisor.stop(TripRequest("third", "Three.", "Look.", late=True), 0.0)
+    over = supervisor.over
     assert over is not None
     assert over.reason == "first"
 

@@ -125,6 +125,7 @@ class SuperTwisting:
     ) -> None:
         self._period = context.period
         self._tolerance = _SAME_STEP * context.period
+        self._shortest, self._longest = self._period - self._tolerance, self._period + self._tolerance
         self._f0, self._ku = context.model.f0, context.model.ku
         self._use(tune(context, L1=L1, L2=L2, M=M, mu0=mu0))
         self._t = self._y = math.nan
@@ -140,27 +141,26 @@ class SuperTwisting:
         """
         t, y, voltage, _ = sample
         dt = t - self._t
-        step = self._nominal if abs(dt - self._period) < self._tolerance else self._step(dt)
+        step = self._nominal if self._shortest < dt < self._longest else self._step(dt)
         if step is None:
             return self._restart(t, y)
         f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12, k1, k2, k3 = step
         u, y0 = self._ku * voltage, self._y
-        z1, z2 = self._z1, self._z2
-        self._z1 = f11 * z1 + f12 * z2 + gu1 * u + h01 * y0 + h11 * y
-        self._z2 = f21 * z1 + f22 * z2 + gu2 * u + h02 * y0 + h12 * y
-        v3 = self._v3
-        v2 = self._v2 + dt * v3
-        v1 = self._v1 + dt * (self._v2 + 0.5 * dt * v3)
-        b = y - self._z1 - v1
+        z1, z2, v2, v3 = self._z1, self._z2, self._v2, self._v3
+        z1, z2 = (
+            f11 * z1 + f12 * z2 + gu1 * u + h01 * y0 + h11 * y,
+            f21 * z1 + f22 * z2 + gu2 * u + h02 * y0 + h12 * y,
+        )
+        v1 = self._v1 + dt * (v2 + 0.5 * dt * v3)
+        v2 = v2 + dt * v3
+        b = y - z1 - v1
         if not abs(b) >= self._floor_from:
             k1, k2, k3 = self._sliding_gains(b, dt)
         self._v1 = v1 = v1 + k1 * b
         self._v2 = v2 = v2 + k2 * b
         self._v3 = v3 = v3 + k3 * b
-        self._t, self._y = t, y
-        return make(
-            Estimate, (self._z1 + v1, self._z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1)
-        )
+        self._t, self._y, self._z1, self._z2 = t, y, z1, z2
+        return make(Estimate, (z1 + v1, z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1))
 
     def retune(self, tuning: Tuning) -> None:
         """Change the gains; keep the estimates of position, velocity, disturbance and its slope.

