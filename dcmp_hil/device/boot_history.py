@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.safety.device_faults import meaning_of, name_of
 from dcmp_hil.values import Fault
-from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterValue, Result
+from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterResult, ParameterValue
 
 if TYPE_CHECKING:
     from dcmp_hil.device.client import DeviceClient
@@ -74,7 +74,7 @@ def history_of(client: DeviceClient) -> History:
 
 def _told(client: DeviceClient, parameter: Parameter) -> int | None:
     found = client.request(ParameterGet(parameter), ParameterValue, lambda answer: answer.id == parameter)
-    return found.value if found is not None and found.result == Result.OK else None
+    return found.value if found is not None and found.result == ParameterResult.OK else None
 
 
 def _shown(value: int | None) -> str:

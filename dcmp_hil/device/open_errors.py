@@ -9,7 +9,7 @@ from dcmp_hil.device.client import LONGEST_TRIP
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
 from dcmp_hil.platform.host_info import contention
 from dcmp_hil.safety.device_faults import meaning_of, name_of
-from dcmp_hil.wire.messages import Result
+from dcmp_hil.wire.messages import ParameterResult
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ def not_kept(name: str, parameter: str, value: int, kept: int) -> OpenError:
 
 
 def _result(result: int) -> str:
-    return Result(result).name if result in set(Result) else f"result {result}"
+    return ParameterResult(result).name if result in set(ParameterResult) else f"result {result}"
 
 
 def not_told(name: str, parameter: str) -> NoAnswerError:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.device import open_errors
 from dcmp_hil.device.client import PATIENCE
 from dcmp_hil.device.compatibility import COMPARED, is_possible
-from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterSet, ParameterValue, Result
+from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterResult, ParameterSet, ParameterValue
 from dcmp_hil.wire.wrapping import unwrap
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class DeviceParameters:
             If there is no answer, or one that cannot be.
         """
         found = self._ask(ParameterGet(parameter))
-        if found is None or found.result != Result.OK:
+        if found is None or found.result != ParameterResult.OK:
             raise open_errors.not_told(self._name, parameter.name)
         if not is_possible(parameter, found.value):
             raise open_errors.impossible(self._name, f"{parameter.name} = {found.value}")
@@ -98,7 +98,7 @@ class DeviceParameters:
 
     def _put(self, parameter: Parameter, value: int) -> None:
         found = self._ask(ParameterSet(self._session, parameter, value))
-        if found is None or found.result != Result.OK or found.value != value:
+        if found is None or found.result != ParameterResult.OK or found.value != value:
             raise open_errors.not_taken(self._name, parameter.name, value, found)
 
     def _hanging(self) -> int:

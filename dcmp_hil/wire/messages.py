@@ -44,7 +44,7 @@ class Parameter(IntEnum):
     TRAVEL_ORIGIN_COUNTS = 16
 
 
-class Result(IntEnum):
+class ParameterResult(IntEnum):
     """Result codes of PARAMETER_SET and PARAMETER_GET."""
 
     OK = 0
@@ -138,7 +138,7 @@ class ParameterValue(NamedTuple):
 
     id: int  # a Parameter
     value: int
-    result: int  # a Result
+    result: int  # a ParameterResult
 
 
 class Health(NamedTuple):

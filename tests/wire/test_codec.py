@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.frame import Frame
-from dcmp_hil.wire.messages import Drive, Parameter, Result, SampleReport, State, StopReason
+from dcmp_hil.wire.messages import Drive, Parameter, ParameterResult, SampleReport, State, StopReason
 from tests.firmware.bench import database, encode
 from tests.wire.judge import KINDS, NAMES, NODES, crc8, crc16, fields_of, make, signals, span
 
@@ -141,7 +141,7 @@ def test_unknown_numbers_are_ignored() -> None:
         (Parameter, "PARAMETER_GET.id", {}),
         (Parameter, "PARAMETER_SET.id", {}),
         (Parameter, "PARAMETER_VALUE.id", {}),
-        (Result, "PARAMETER_VALUE.result", {}),
+        (ParameterResult, "PARAMETER_VALUE.result", {}),
         (Fault, "FAULT.code", {"TWO_DEVICES": 253, "DISARMED": 254, "UNKNOWN": 255}),
     ],
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.checks.drives import was_accepted
 from dcmp_hil.conformance.terms import NotJudgedError
-from dcmp_hil.wire.messages import Parameter, Result, State
+from dcmp_hil.wire.messages import Parameter, ParameterResult, State
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -207,7 +207,7 @@ def not_idle(client: Client) -> Iterator[str]:
     found = client.put(session, Parameter.VOLTAGE_LIMIT_MV, 1)
     if found is None:
         yield "PARAMETER_SET is not answered in RUN"
-    elif found.result != Result.NOT_IDLE or found.value == 1:
+    elif found.result != ParameterResult.NOT_IDLE or found.value == 1:
         yield f"PARAMETER_SET in RUN is answered by result {found.result}, value {found.value}, not by 4"
 
 

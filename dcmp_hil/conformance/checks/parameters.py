@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
-from dcmp_hil.wire.messages import Parameter, Result, State
+from dcmp_hil.wire.messages import Parameter, ParameterResult, State
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,7 +51,7 @@ def read(client: Client) -> Iterator[str]:
         if found is None:
             yield f"PARAMETER_GET {parameter.name} is not answered"
             continue
-        if found.result != Result.OK:
+        if found.result != ParameterResult.OK:
             yield f"{parameter.name} is answered by result {found.result}; every device has it"
         low, high = _RANGES.get(parameter, (-_VALUE_MAX - 1, _VALUE_MAX))
         if not low <= found.value <= high:
@@ -68,14 +68,16 @@ def unknown(client: Client) -> Iterator[str]:
         ):
             if found is None:
                 yield f"PARAMETER {number}: {what} is not answered"
-            elif (found.value, found.result) != (0, Result.UNKNOWN):
+            elif (found.value, found.result) != (0, ParameterResult.UNKNOWN):
                 yield (
                     f"PARAMETER {number}: {what} is answered by value {found.value}, result {found.result}; "
                     "it does not exist: value 0, result 1"
                 )
 
 
-def _tried(client: Client, session: int, parameter: Parameter, value: int, expected: Result) -> Iterator[str]:
+def _tried(
+    client: Client, session: int, parameter: Parameter, value: int, expected: ParameterResult
+) -> Iterator[str]:
     """Set a value and compare what comes of it."""
     before = client.value(parameter)
     found = client.put(session, parameter, value)
@@ -91,7 +93,7 @@ def _tried(client: Client, session: int, parameter: Parameter, value: int, expec
     ticking = parameter == Parameter.TICK
     if not ticking and found.value != now:
         yield f"{parameter.name} set to {value} is answered by {found.value}, and is {now}"
-    if not ticking and now != (value if expected == Result.OK else before):
+    if not ticking and now != (value if expected == ParameterResult.OK else before):
         yield f"{parameter.name} was {before}, was set to {value} with {expected.name}, and is {now}"
 
 
@@ -100,7 +102,7 @@ def read_only(client: Client) -> Iterator[str]:
     session = client.own()
     for parameter in _READ_ONLY:
         value = client.value(parameter)
-        yield from _tried(client, session, parameter, 1 if value != 1 else 2, Result.READ_ONLY)
+        yield from _tried(client, session, parameter, 1 if value != 1 else 2, ParameterResult.READ_ONLY)
 
 
 def ranges(client: Client) -> Iterator[str]:
@@ -109,55 +111,55 @@ def ranges(client: Client) -> Iterator[str]:
     for parameter in _LIMITS:
         built = client.value(parameter)
         for value, expected in (
-            (1, Result.OK),
-            (0, Result.OUT_OF_RANGE),
-            (-1, Result.OUT_OF_RANGE),
-            (-_VALUE_MAX - 1, Result.OUT_OF_RANGE),
-            (max(1, built // 2), Result.OK),
-            (built, Result.OK),
+            (1, ParameterResult.OK),
+            (0, ParameterResult.OUT_OF_RANGE),
+            (-1, ParameterResult.OUT_OF_RANGE),
+            (-_VALUE_MAX - 1, ParameterResult.OUT_OF_RANGE),
+            (max(1, built // 2), ParameterResult.OK),
+            (built, ParameterResult.OK),
         ):
             yield from _tried(client, session, parameter, value, expected)
         if built < _VALUE_MAX:
-            yield from _tried(client, session, parameter, built + 1, Result.OUT_OF_RANGE)
-            yield from _tried(client, session, parameter, _VALUE_MAX, Result.OUT_OF_RANGE)
+            yield from _tried(client, session, parameter, built + 1, ParameterResult.OUT_OF_RANGE)
+            yield from _tried(client, session, parameter, _VALUE_MAX, ParameterResult.OUT_OF_RANGE)
     built = client.value(Parameter.WATCHDOG_MS)
     for value, expected in (
-        (5, Result.OK),
-        (4, Result.OUT_OF_RANGE),
-        (built, Result.OK),
-        (built + 1, Result.OUT_OF_RANGE),
-        (51, Result.OUT_OF_RANGE),
-        (-5, Result.OUT_OF_RANGE),
+        (5, ParameterResult.OK),
+        (4, ParameterResult.OUT_OF_RANGE),
+        (built, ParameterResult.OK),
+        (built + 1, ParameterResult.OUT_OF_RANGE),
+        (51, ParameterResult.OUT_OF_RANGE),
+        (-5, ParameterResult.OUT_OF_RANGE),
     ):
         yield from _tried(client, session, Parameter.WATCHDOG_MS, value, expected)
     slew = client.value(Parameter.SLEW_MV_PER_MS)
-    yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, 0, Result.OUT_OF_RANGE)
-    yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, 1, Result.OK)
+    yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, 0, ParameterResult.OUT_OF_RANGE)
+    yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, 1, ParameterResult.OK)
     if slew:
-        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, slew + 1, Result.OUT_OF_RANGE)
+        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, slew + 1, ParameterResult.OUT_OF_RANGE)
     else:
-        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, _VALUE_MAX, Result.OK)
+        yield from _tried(client, session, Parameter.SLEW_MV_PER_MS, _VALUE_MAX, ParameterResult.OK)
     for value, expected in (
-        (0, Result.OK),
-        (2**24, Result.OUT_OF_RANGE),
-        (2**24 - 1, Result.OK),
-        (_FIRST_ARMING - 1, Result.OUT_OF_RANGE),
-        (_FIRST_ARMING, Result.OK),
+        (0, ParameterResult.OK),
+        (2**24, ParameterResult.OUT_OF_RANGE),
+        (2**24 - 1, ParameterResult.OK),
+        (_FIRST_ARMING - 1, ParameterResult.OUT_OF_RANGE),
+        (_FIRST_ARMING, ParameterResult.OK),
     ):
         yield from _tried(client, session, Parameter.TRAVEL_ORIGIN_COUNTS, value, expected)
-    yield from _tried(client, session, Parameter.EDGE_STAMPS, 2, Result.OUT_OF_RANGE)
-    yield from _tried(client, session, Parameter.EDGE_STAMPS, 0, Result.OK)
+    yield from _tried(client, session, Parameter.EDGE_STAMPS, 2, ParameterResult.OUT_OF_RANGE)
+    yield from _tried(client, session, Parameter.EDGE_STAMPS, 0, ParameterResult.OK)
 
 
 def owner_only(client: Client) -> Iterator[str]:
     """Set as a stranger; of several reasons the lowest is answered."""
     stranger = client.another_session()
-    yield from _tried(client, stranger, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_OWNER)
+    yield from _tried(client, stranger, Parameter.VOLTAGE_LIMIT_MV, 1, ParameterResult.NOT_OWNER)
     client.own()
     other = client.another_session()
-    yield from _tried(client, other, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_OWNER)
-    yield from _tried(client, other, Parameter.VOLTAGE_LIMIT_MV, 0, Result.OUT_OF_RANGE)
-    yield from _tried(client, other, Parameter.PERIOD_US, 0, Result.READ_ONLY)
+    yield from _tried(client, other, Parameter.VOLTAGE_LIMIT_MV, 1, ParameterResult.NOT_OWNER)
+    yield from _tried(client, other, Parameter.VOLTAGE_LIMIT_MV, 0, ParameterResult.OUT_OF_RANGE)
+    yield from _tried(client, other, Parameter.PERIOD_US, 0, ParameterResult.READ_ONLY)
 
 
 def idle_only(client: Client) -> Iterator[str]:
@@ -167,9 +169,11 @@ def idle_only(client: Client) -> Iterator[str]:
     if client.settled_state() != State.FAULT:
         yield "STOP does not lead from IDLE to FAULT"
         return
-    yield from _tried(client, session, Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_IDLE)
-    yield from _tried(client, client.another_session(), Parameter.VOLTAGE_LIMIT_MV, 1, Result.NOT_IDLE)
-    yield from _tried(client, session, Parameter.VOLTAGE_LIMIT_MV, 0, Result.OUT_OF_RANGE)
+    yield from _tried(client, session, Parameter.VOLTAGE_LIMIT_MV, 1, ParameterResult.NOT_IDLE)
+    yield from _tried(
+        client, client.another_session(), Parameter.VOLTAGE_LIMIT_MV, 1, ParameterResult.NOT_IDLE
+    )
+    yield from _tried(client, session, Parameter.VOLTAGE_LIMIT_MV, 0, ParameterResult.OUT_OF_RANGE)
 
 
 CHECKS = (

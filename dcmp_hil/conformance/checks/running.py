@@ -10,7 +10,7 @@ from dcmp_hil.conformance.checks.arming import LOW_MV, run
 from dcmp_hil.conformance.checks.drives import ROOM
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
-from dcmp_hil.wire.messages import FaultReport, Parameter, Result, State
+from dcmp_hil.wire.messages import FaultReport, Parameter, ParameterResult, State
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +25,7 @@ _CORRUPT_LIMIT = 10
 def lower(client: Client, session: int, parameter: Parameter, value: int) -> None:
     """Set a parameter for a check."""
     found = client.put(session, parameter, value)
-    if found is None or found.result != Result.OK:
+    if found is None or found.result != ParameterResult.OK:
         raise NotJudgedError(f"{parameter.name} could not be set to {value}: `parameters-range` says more")
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.terms import NotJudgedError
-from dcmp_hil.wire.messages import Hello, Identity, Parameter, Result
+from dcmp_hil.wire.messages import Hello, Identity, Parameter, ParameterResult
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def repeated_hello(client: Client) -> Iterator[str]:
     session = client.own()
     built = client.value(Parameter.VOLTAGE_LIMIT_MV)
     answer = client.put(session, Parameter.VOLTAGE_LIMIT_MV, 1)
-    if answer is None or answer.result != Result.OK:
+    if answer is None or answer.result != ParameterResult.OK:
         raise NotJudgedError("VOLTAGE_LIMIT_MV could not be lowered: `parameters-range` says more")
     _accepted(client, session)
     before = client.health().sequence_gaps

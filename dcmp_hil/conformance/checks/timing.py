@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
 from dcmp_hil.conformance.lines import SlcanLine
-from dcmp_hil.wire.messages import Edge, Health, Parameter, ParameterGet, ParameterValue, Result, State
+from dcmp_hil.wire.messages import (
+    Edge,
+    Health,
+    Parameter,
+    ParameterGet,
+    ParameterResult,
+    ParameterValue,
+    State,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -154,7 +162,7 @@ def edges(client: Client) -> Iterator[str]:
     answer = client.put(session, Parameter.EDGE_STAMPS, 1)
     if answer is None:
         yield "PARAMETER_SET EDGE_STAMPS is not answered"
-    elif (answer.value, answer.result) not in ((1, Result.OK), (0, Result.OUT_OF_RANGE)):
+    elif (answer.value, answer.result) not in ((1, ParameterResult.OK), (0, ParameterResult.OUT_OF_RANGE)):
         yield f"EDGE_STAMPS set to 1 was answered by value {answer.value}, result {answer.result}"
 
 
