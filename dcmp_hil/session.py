@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble
-from dcmp_hil.control.trajectory import LOWERING
+from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
 from dcmp_hil.ipc.run_end import ZERO, end_after
@@ -214,7 +214,7 @@ class Session:
         if self.rig.run.end == "lower" and not self.stop.requested:
             recorder.event(Event(t, "INFO", EventKind.LOWERING, "lowering the arm"))
             stages.trajectory.lower(t + stages.delay)
-            loop.run(stages, t + stages.delay + LOWERING, self.stop)
+            loop.run(stages, t + stages.delay + LOWERING_TIME_S, self.stop)
 
     def _tell(self, level: Level, kind: EventKind, text: str, data: EventData | None = None) -> None:
         """Report an event at the device time of the last cycle."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.stop_request import StopRequest
 
 _DEVICE = "sim_backend.board.virtual_device:VirtualDevice"
-_STATUS_S = 0.1  # between two looks at Ctrl-C, and two status lines
+_STATUS_PERIOD_S = 0.1  # between two looks at Ctrl-C, and two status lines
 _RIG = "bench-1khz"
 _RUN_WITH = {
     "cobs": ("backend.kind=serial", "backend.port={port}"),
@@ -79,7 +79,7 @@ def _keep_running(running: Any, rig: Rig, stop: StopRequest) -> None:
     """Run the virtual device's ticks until the end is requested."""
     from rich.live import Live
 
-    ticks = max(1, round(_STATUS_S / rig.period))
+    ticks = max(1, round(_STATUS_PERIOD_S / rig.period))
     terminal = console.err.is_terminal
     live = Live(console=console.err, auto_refresh=False, transient=True) if terminal else nullcontext()
     with live as line:

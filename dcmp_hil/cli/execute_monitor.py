@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.messages import Message
 
 _POLL_PERIOD_S = 0.1  # s, how long a Ctrl-C waits at most
-_BRIEF_NS = 100_000_000  # between two SAMPLEs, or two DRIVEs, that are shown
+_SHOWN_INTERVAL_MIN_NS = 100_000_000  # between two SAMPLEs, or two DRIVEs, that are shown
 _FREQUENT_MESSAGES = (SampleReport, Drive)
 
 
@@ -36,7 +36,10 @@ class _Brief:
     def lets_through(self, node: int, message: Message, now_ns: int) -> bool:
         """Return whether this message is to be shown."""
         kind = (node, type(message))
-        if isinstance(message, _FREQUENT_MESSAGES) and now_ns - self._shown.get(kind, -_BRIEF_NS) < _BRIEF_NS:
+        if (
+            isinstance(message, _FREQUENT_MESSAGES)
+            and now_ns - self._shown.get(kind, -_SHOWN_INTERVAL_MIN_NS) < _SHOWN_INTERVAL_MIN_NS
+        ):
             return False
         self._shown[kind] = now_ns
         return True

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 INCOMPLETE = "recording_incomplete"
 """How a run ended that went well, and is not wholly in its recording."""
 _BOARD = "backend.kind=sim-board"
-_PICTURE_UP_TO = 600.0  # s: a longer run is not kept in memory for a picture
+_PICTURE_DURATION_MAX_S = 600.0  # s: a longer run is not kept in memory for a picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _session(
         fast=options.fast,
         window_from=options.window_from,
         sinks=_makers(rig, options, folder),
-        keep_columns=folder is not None and 0 < length <= _PICTURE_UP_TO and _wants_picture(options),
+        keep_columns=folder is not None and 0 < length <= _PICTURE_DURATION_MAX_S and _wants_picture(options),
         stop=stop,
         warn=console.warn,
         control=_control(rig, options, folder),

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 _ATTEMPTS_MAX, _ATTEMPT_PERIOD_S = 50, 0.02  # s: the telemetry process may still be closing it
 _DATA_BYTES_PER_PERIOD, _PICTURE_BYTES_PER_PERIOD = 140.0, 170.0  # bytes a period, of run.mcap and of run.rrd
-_UNTIL_STOPPED = 600.0  # s that a run without a duration is taken for
-_MEGA = 1e-6
+_UNLIMITED_RUN_DURATION_S = 600.0  # s that a run without a duration is taken for
+_MB_PER_BYTE = 1e-6
 
 
 class Kept(NamedTuple):
@@ -94,7 +94,7 @@ def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture
     picture
         Whether run.rrd goes there as well.
     """
-    seconds = length or _UNTIL_STOPPED
+    seconds = length or _UNLIMITED_RUN_DURATION_S
     data = _DATA_BYTES_PER_PERIOD * rig.loop.rate_hz * seconds
     needed = data + (_PICTURE_BYTES_PER_PERIOD * min(rig.loop.rate_hz, 2000.0) * seconds if picture else 0.0)
     if free >= needed:
@@ -102,7 +102,7 @@ def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture
     fits = free / (_DATA_BYTES_PER_PERIOD * rig.loop.rate_hz)
     what = f"{seconds:g} s" if length else "ten minutes of a run until Ctrl-C"
     return (
-        f"{folder}: {_MEGA * free:.3g} MB are free, and {what} at {rig.loop.rate_hz:g} Hz need about "
-        f"{_MEGA * needed:.3g} MB, {_MEGA * data:.3g} of them for run.mcap. Free some space, or choose "
-        f"--duration {max(1.0, float(f'{fits:.2g}')):g} at most; run.rrd ends first."
+        f"{folder}: {_MB_PER_BYTE * free:.3g} MB are free, and {what} at {rig.loop.rate_hz:g} Hz need about "
+        f"{_MB_PER_BYTE * needed:.3g} MB, {_MB_PER_BYTE * data:.3g} of them for run.mcap. Free some space, "
+        f"or choose --duration {max(1.0, float(f'{fits:.2g}')):g} at most; run.rrd ends first."
     )

@@ -31,7 +31,7 @@ _KEYS = {  # short options for keys of a rig
     "ku": "model.ku_rad_s2_V",
 }
 _OF_A_FILE = ("observer", "model", "encoder")
-_NO_RIG = {"loop": {"rate_hz": 20_000.0}}  # the rate bounds mu0, and that of the recording is another
+_NO_RIG_TABLES = {"loop": {"rate_hz": 20_000.0}}  # the rate bounds mu0, and that of the recording is another
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,9 @@ class Given:
         kind = _kind(self.gains.get("observer"))
         if kind is not None:
             overrides = (f"observer.kind={_toml(kind)}", *overrides)
-        rig = load_table(deepcopy(_NO_RIG), overrides) if source is None else load_rig(source, overrides)
+        rig = (
+            load_table(deepcopy(_NO_RIG_TABLES), overrides) if source is None else load_rig(source, overrides)
+        )
         return _settings_of(rig, named=source is not None)
 
     def _counts(self) -> Any:

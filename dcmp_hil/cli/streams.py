@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from _typeshed import ReadableBuffer
 
-_IN, _OUT, _ERR = 0, 1, 2
+_STDIN_FILENO, _STDOUT_FILENO, _STDERR_FILENO = 0, 1, 2
 _ERRORS = "dcmp_hil.substitute"
 _SUBSTITUTES = str.maketrans(
     "µ²\N{EN DASH}→≤≥\N{MULTIPLICATION SIGN}…─│╭╮╰╯┌┐└┘├┤━┃▁▂▃▄▅▆▇█",
@@ -67,13 +67,13 @@ def guard() -> None:
     the caller closed lead to the null device: the next file that is opened would else take their place.
     """
     codecs.register_error(_ERRORS, _substitute)
-    for number in (_IN, _OUT, _ERR):
+    for number in (_STDIN_FILENO, _STDOUT_FILENO, _STDERR_FILENO):
         try:
             os.fstat(number)
         except OSError:
             _lead_to_null(number)
-    sys.stdout = _guarded(sys.stdout, _OUT)
-    sys.stderr = _guarded(sys.stderr, _ERR)
+    sys.stdout = _guarded(sys.stdout, _STDOUT_FILENO)
+    sys.stderr = _guarded(sys.stderr, _STDERR_FILENO)
 
 
 def text_on(number: int) -> TextIO:

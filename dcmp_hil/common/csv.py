@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_MOST_FAULTS = 5  # named one by one; the rest are counted
-_LONGEST_SHOWN = 40  # characters of a field
+_NAMED_FAULTS_MAX = 5  # named one by one; the rest are counted
+_SHOWN_CHARS_MAX = 40  # characters of a field
 _DELIMITERS = ",;\t"
 _FILE_MAX_MIB = 16  # a reference has a row a corner, not a row a cycle
 
@@ -187,9 +187,9 @@ def _numbers(text: Text, wanted: Sequence[str]) -> dict[str, NDArray[np.float64]
             else:
                 values[number, place] = value
     if faults:
-        more = [f"... and {len(faults) - _MOST_FAULTS} more"] if len(faults) > _MOST_FAULTS else []
+        more = [f"... and {len(faults) - _NAMED_FAULTS_MAX} more"] if len(faults) > _NAMED_FAULTS_MAX else []
         remedy = "Mend or remove those rows; a lost sample may simply be left out."
-        raise ConfigError(*faults[:_MOST_FAULTS], *more, remedy)
+        raise ConfigError(*faults[:_NAMED_FAULTS_MAX], *more, remedy)
     return {name: values[:, place].copy() for place, name in enumerate(wanted)}
 
 
@@ -212,7 +212,7 @@ def _check_names(text: Text, wanted: Sequence[str]) -> None:
 def _shown(field: str) -> str:
     if not field:
         return "nothing"
-    return repr(field if len(field) <= _LONGEST_SHOWN else field[:_LONGEST_SHOWN] + "...")
+    return repr(field if len(field) <= _SHOWN_CHARS_MAX else field[:_SHOWN_CHARS_MAX] + "...")
 
 
 def _finite(text: str) -> float | None:

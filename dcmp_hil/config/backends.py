@@ -9,9 +9,9 @@ from pydantic import Field
 from dcmp_hil.common.section import Section
 from dcmp_hil.config.sections import Custom
 
-_PAIR_COBS = 2 * 14 * 10  # bits of a DRIVE and a SAMPLE on the wire, start and stop bits included
-_PAIR_SLCAN = 2 * 22 * 10
-_PAIR_CAN = 270  # the longest pair of classic frames, stuff bits and all
+_COBS_PAIR_BITS = 2 * 14 * 10  # bits of a DRIVE and a SAMPLE on the wire, start and stop bits included
+_SLCAN_PAIR_BITS = 2 * 22 * 10
+_CAN_PAIR_BITS_MAX = 270  # the longest pair of classic frames, stuff bits and all
 
 
 class Capacity(NamedTuple):
@@ -83,7 +83,7 @@ class Serial(Device):
     @property
     def capacity(self) -> Capacity | None:
         """Rate of the serial line, and what one cycle needs of it."""
-        return Capacity("baud", self.baud, _PAIR_COBS)
+        return Capacity("baud", self.baud, _COBS_PAIR_BITS)
 
 
 class Can(Device):
@@ -108,8 +108,8 @@ class Can(Device):
         if self.interface == "virtual":
             return None
         if self.interface == "slcan":
-            return Capacity("baud", self.baud, _PAIR_SLCAN)
-        return Capacity("bitrate", self.bitrate, _PAIR_CAN)
+            return Capacity("baud", self.baud, _SLCAN_PAIR_BITS)
+        return Capacity("bitrate", self.bitrate, _CAN_PAIR_BITS_MAX)
 
 
 class CustomBackend(Traits, Custom):

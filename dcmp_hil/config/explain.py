@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.rig import Rig
 
-_LEAST_DAMPING = 0.5
-_FAR_FROM_RULE = 3.0
+_DAMPING_RATIO_MIN = 0.5
+_MU0_RULE_RATIO_MAX = 3.0
 
 
 def explain(rig: Rig) -> list[tuple[str, str, str]]:
@@ -98,7 +98,7 @@ def _observer(rig: Rig) -> str:
         usual = bandwidth_floor(counts, rig.period)
         if observer.mu0_rad_s == 0.0:
             return "observer.mu0_rad_s = 0: without its floor the loop runs away on a motor 25 % too strong."
-        if not usual / _FAR_FROM_RULE <= observer.mu0_rad_s <= usual * _FAR_FROM_RULE:
+        if not usual / _MU0_RULE_RATIO_MAX <= observer.mu0_rad_s <= usual * _MU0_RULE_RATIO_MAX:
             return f"observer.mu0_rad_s = {observer.mu0_rad_s:g} is far from the rule's {usual:.3g} rad/s."
     return ""
 
@@ -107,7 +107,7 @@ def _damping(rig: Rig) -> str:
     if not isinstance(rig.controller, PdSettings) or rig.controller.kp_1_s2 == 0.0:
         return ""
     zeta = rig.controller.kd_1_s / (2.0 * math.sqrt(rig.controller.kp_1_s2))
-    if zeta >= _LEAST_DAMPING:
+    if zeta >= _DAMPING_RATIO_MIN:
         return ""
     return f"controller: damping kd/(2 sqrt kp) = {zeta:.2f} will ring; kd = 2 sqrt kp gives 1."
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 _SHOWN_CHARS_MAX = 60  # characters of a key or a value that are shown
-_LARGEST_PLAIN = 1e15  # beyond it a float no longer holds every whole number
+_PLAIN_NUMBER_MAX = 1e15  # beyond it a float no longer holds every whole number
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 _TYPES = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}
 
@@ -19,7 +19,7 @@ def number(value: float) -> str:
     short = f"{value:g}"
     if "e" not in short and float(short) == value:
         return short
-    whole = abs(value) < _LARGEST_PLAIN and value == int(value)
+    whole = abs(value) < _PLAIN_NUMBER_MAX and value == int(value)
     return str(int(value)) if whole else repr(value)
 
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
 _FOLDER = resources.files("dcmp_hil").joinpath("rigs")
-_FILE_MAX = 128 * 1024  # bytes: no rig is that long
-_LINE_MAX = 4096  # characters: the time for a dotted key grows with the square of its length
+_FILE_BYTES_MAX = 128 * 1024  # bytes: no rig is that long
+_LINE_CHARS_MAX = 4096  # characters: the time for a dotted key grows with the square of its length
 
 
 def shipped_rigs() -> list[str]:
@@ -143,16 +143,18 @@ def _read(source: str | Path) -> tuple[str, str, Path]:
     path, place = Path(source), printable(name)
     try:
         with path.open("rb") as file:
-            raw = file.read(_FILE_MAX + 1)
+            raw = file.read(_FILE_BYTES_MAX + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(
             f"{place}: {reason}. Check the path; `dcmp-hil rigs` lists the shipped rigs."
         ) from None
-    if len(raw) > _FILE_MAX:
-        raise ConfigError(f"{place}: more than {_FILE_MAX // 1024} KiB, which no rig is. Check the path.")
-    if max(map(len, raw.split(b"\n"))) > _LINE_MAX:
-        raise ConfigError(f"{place}: a line of more than {_LINE_MAX} characters. Break it into lines.")
+    if len(raw) > _FILE_BYTES_MAX:
+        raise ConfigError(
+            f"{place}: more than {_FILE_BYTES_MAX // 1024} KiB, which no rig is. Check the path."
+        )
+    if max(map(len, raw.split(b"\n"))) > _LINE_CHARS_MAX:
+        raise ConfigError(f"{place}: a line of more than {_LINE_CHARS_MAX} characters. Break it into lines.")
     try:
         return raw.decode("utf-8-sig"), place, path.parent
     except UnicodeDecodeError as error:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 _SHOWN_CHARS_MAX = 60  # characters of an override that are shown
 _OVERRIDES_MAX = 200
-_CHARACTERS_MAX = 8192  # of one override; a path has 4096 at most
-_DEPTH_MAX = 8  # parts of a dotted key; a rig's longest has 2, a class of the user's own may have tables
+_OVERRIDE_CHARS_MAX = 8192  # of one override; a path has 4096 at most
+_KEY_PARTS_MAX = 8  # parts of a dotted key; a rig's longest has 2, a class of the user's own may have tables
 
 
 def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]:
@@ -59,11 +59,11 @@ def _parsed(overrides: Sequence[str]) -> tuple[dict[tuple[str, ...], Any], list[
     for override in overrides:
         key, equals, text = override.partition("=")
         shown = printable(override[:_SHOWN_CHARS_MAX])[:_SHOWN_CHARS_MAX]
-        parts = tuple(part.strip() for part in key.split(".", _DEPTH_MAX))
-        if len(override) > _CHARACTERS_MAX or len(parts) > _DEPTH_MAX:
+        parts = tuple(part.strip() for part in key.split(".", _KEY_PARTS_MAX))
+        if len(override) > _OVERRIDE_CHARS_MAX or len(parts) > _KEY_PARTS_MAX:
             faults.append(
-                f"--set {shown}...: too long; at most {_CHARACTERS_MAX} characters, and {_DEPTH_MAX} parts "
-                "of a key. Write it into the rig file."
+                f"--set {shown}...: too long; at most {_OVERRIDE_CHARS_MAX} characters, and {_KEY_PARTS_MAX} "
+                "parts of a key. Write it into the rig file."
             )
         elif equals and all(parts):
             pairs.pop(parts, None)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.rig import Rig
 
-_LOOK_AHEAD = 60.0  # s of a csv reference that are looked at where the run has no end
+_LOOK_AHEAD_S = 60.0  # s of a csv reference that are looked at where the run has no end
 _REFERENCE_POINTS = 2000
 _WATCH_RATIO_MIN = 1.5  # of what pushes a healthy arm, that its watch needs
 _HOLDING_TORQUE_SHARE_MAX = 0.95  # of the motor's torque, that holding the arm may take
@@ -48,7 +48,7 @@ def peaks(rig: Rig) -> Peaks:
         hardest = reference.acceleration_rad_s2 if low != high else 0.0
         fastest = min(reference.velocity_rad_s, math.sqrt(abs(high - low) * hardest))
         return Peaks(max(abs(low), abs(high)), fastest, hardest)
-    length = rig.run.duration_s or _LOOK_AHEAD
+    length = rig.run.duration_s or _LOOK_AHEAD_S
     looks = [reference.at(length * k / _REFERENCE_POINTS) for k in range(_REFERENCE_POINTS + 1)]
     return Peaks(*(max(map(abs, column)) for column in zip(*looks, strict=True)))
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from dcmp_hil.common.section import Section
     from dcmp_hil.config.tables import RigTables
 
-_COARSEST_ENCODER = 256  # counts a revolution
-_LEAST_TRAVEL, _LEAST_SPEED = 0.2, 2.0  # rad, rad/s
+_ENCODER_COUNTS_PER_REV_MIN = 256  # counts a revolution
+_POSITION_LIMIT_MIN_RAD, _VELOCITY_LIMIT_MIN_RAD_S = 0.2, 2.0  # rad, rad/s
 _FEWEST_COUNTS = 2  # from the encoder's middle to a limit of travel
 _HOLDING_TORQUE_SHARE_MAX = 0.95  # of the motor's torque
 _POSITIVE_MIN = 1e-6  # of any key that must be above 0
@@ -106,12 +106,13 @@ def _link_carries_rate(rig: RigTables) -> str:
 def _encoder_shows_faults(rig: RigTables) -> str:
     """Refuse an encoder so coarse that a fault of it is found too late; see docs/safety.md."""
     counts = rig.encoder.counts
-    if counts is None or counts >= _COARSEST_ENCODER or rig.supervisor.monitors != "all":
+    if counts is None or counts >= _ENCODER_COUNTS_PER_REV_MIN or rig.supervisor.monitors != "all":
         return ""
     return (
-        f"encoder.counts_per_rev: got {number(counts)}; below {_COARSEST_ENCODER} a stuck encoder or lost "
-        "motor power is found later than the 600 ms that are promised. Count all four edges (quadrature), or "
-        'take a finer encoder; in simulation supervisor.monitors = "finite" runs without the watch.'
+        f"encoder.counts_per_rev: got {number(counts)}; below {_ENCODER_COUNTS_PER_REV_MIN} a stuck encoder "
+        "or lost motor power is found later than the 600 ms that are promised. Count all four edges "
+        '(quadrature), or take a finer encoder; in simulation supervisor.monitors = "finite" runs without '
+        "the watch."
     )
 
 
@@ -123,15 +124,17 @@ def _limits_leave_room(rig: RigTables) -> str:
     faults = []
     if limits.start == "immediate" or limits.probe == "off":
         return ""
-    if limits.position_limit_rad < _LEAST_TRAVEL:
+    if limits.position_limit_rad < _POSITION_LIMIT_MIN_RAD:
         faults.append(
             f"supervisor.position_limit_rad: got {number(limits.position_limit_rad)}; at least "
-            f"{number(_LEAST_TRAVEL)} rad: the probe before the start moves the arm by up to 0.1 rad."
+            f"{number(_POSITION_LIMIT_MIN_RAD)} rad: the probe before the start moves the arm by up to "
+            "0.1 rad."
         )
-    if limits.velocity_limit_rad_s < _LEAST_SPEED:
+    if limits.velocity_limit_rad_s < _VELOCITY_LIMIT_MIN_RAD_S:
         faults.append(
             f"supervisor.velocity_limit_rad_s: got {number(limits.velocity_limit_rad_s)}; at least "
-            f"{number(_LEAST_SPEED)} rad/s: the probe before the start moves the arm at up to 1 rad/s."
+            f"{number(_VELOCITY_LIMIT_MIN_RAD_S)} rad/s: the probe before the start moves the arm at up to "
+            "1 rad/s."
         )
     return "\n".join(faults)
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from dcmp_hil.common.section import Section
 from dcmp_hil.control.model import Model
 
-_SHORT_OF = 0.95  # of a limit that trips: room for the arm to overshoot a reference that stops there
+_REFERENCE_LIMIT_SHARE = 0.95  # of a limit that trips: room to overshoot a reference that stops there
 
 
 class LoopSection(Section):
@@ -148,7 +148,10 @@ class SupervisorSection(Section):
     @property
     def reference_limits(self) -> tuple[float, float]:
         """Farthest position and largest velocity that a reference is let ask for, rad and rad/s."""
-        return _SHORT_OF * self.position_limit_rad, _SHORT_OF * self.velocity_limit_rad_s
+        return (
+            _REFERENCE_LIMIT_SHARE * self.position_limit_rad,
+            _REFERENCE_LIMIT_SHARE * self.velocity_limit_rad_s,
+        )
 
     @property
     def error_limit(self) -> float:

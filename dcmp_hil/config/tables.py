@@ -32,8 +32,10 @@ from dcmp_hil.control.references.table import Table
 if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
 
-_OF_ALL, _OF_SPARE, _OF_MOTOR = 0.85, 0.7, 0.25  # of all the motor has; of what is left; at least, of all
-_COARSEST_STEP = 200e-6  # s: every figure of the project's tables holds there
+_TOTAL_ACCELERATION_SHARE = 0.85  # of all that the motor has
+_SPARE_ACCELERATION_SHARE = 0.7  # of what is left
+_SPARE_ACCELERATION_SHARE_MIN = 0.25  # the same, at least, of all
+_PLANT_STEP_MAX_S = 200e-6  # s: every figure of the project's tables holds there
 
 
 def _kind_or_custom(default: str) -> Discriminator:
@@ -131,7 +133,7 @@ class RigTables(Section):
     def plant_steps(self) -> int:
         """Steps of the simulated plant in a period."""
         if self.sim.step_us == "auto":
-            return math.ceil(self.period / _COARSEST_STEP - 1e-9)
+            return math.ceil(self.period / _PLANT_STEP_MAX_S - 1e-9)
         return max(1, round(self.period / (self.sim.step_us * 1e-6)))
 
     @property
@@ -142,8 +144,11 @@ class RigTables(Section):
         """
         model, motor = self.model, self.model.ku_rad_s2_V * self.amplifier.limit
         pushed = abs(model.eta_rad_s2) + abs(model.eta_amplitude_rad_s2)
-        spare = max(_OF_SPARE * (motor - pushed - model.gravity_rad_s2), _OF_MOTOR * motor)
-        return max(_OF_ALL * motor - pushed, spare), spare
+        spare = max(
+            _SPARE_ACCELERATION_SHARE * (motor - pushed - model.gravity_rad_s2),
+            _SPARE_ACCELERATION_SHARE_MIN * motor,
+        )
+        return max(_TOTAL_ACCELERATION_SHARE * motor - pushed, spare), spare
 
     @property
     def impossible_on_a_wire(self) -> list[str]:

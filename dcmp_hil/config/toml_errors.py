@@ -9,8 +9,8 @@ from typing import Any
 from dcmp_hil.config.formatting import dotted, printable
 from dcmp_hil.errors import ConfigError
 
-_LONGEST_NAME = 60
-_LONGEST_LINE = 60
+_NAME_CHARS_MAX = 60
+_SHOWN_LINE_CHARS_MAX = 60
 
 
 def parse(text: str, place: str) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def parse_value(text: str) -> Any:
 
 def name_from(stem: str) -> str:
     """Make a rig's name of a file's."""
-    return re.sub(r"[^\w.-]+", "-", stem).lstrip(".-")[:_LONGEST_NAME] or "rig"
+    return re.sub(r"[^\w.-]+", "-", stem).lstrip(".-")[:_NAME_CHARS_MAX] or "rig"
 
 
 def _explained(fault: str, text: str) -> str:
@@ -57,7 +57,7 @@ def _explained(fault: str, text: str) -> str:
     if not found or not 0 < int(found[1]) <= len(lines):
         return f"{fault}. {_remedy('')}"
     line = lines[int(found[1]) - 1].strip()
-    shown = printable(line[:_LONGEST_LINE])
+    shown = printable(line[:_SHOWN_LINE_CHARS_MAX])
     return f"{fault}: `{shown}`. {_remedy(line)}" if line else f"{fault}. {_remedy('')}"
 
 

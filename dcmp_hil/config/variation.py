@@ -16,7 +16,7 @@ _VARIATION_RATIO = 10.0
 """Times the rule's, that the paper's Euler steps and an observer of one's own may cost."""
 _HORIZON_S = 60.0  # of the reference
 _WINDOW_S = 0.5  # of one window
-_WINDOWS = 120  # in the horizon
+_WINDOW_COUNT = 120  # in the horizon
 _POINTS_PER_WINDOW = 30  # instants in each window
 
 
@@ -40,8 +40,8 @@ def expected_variation(rig: Rig) -> float:
 def _of_reference(rig: Rig) -> float:
     """Return the largest mean of |dV/dt| in a window that following the reference takes, V/s."""
     most, step = 0.0, rig.period
-    for window in range(_WINDOWS):
-        begin = window * _HORIZON_S / _WINDOWS
+    for window in range(_WINDOW_COUNT):
+        begin = window * _HORIZON_S / _WINDOW_COUNT
         changes = [
             abs(_voltage(rig, t + step) - _voltage(rig, t))
             for t in (begin + k * _WINDOW_S / _POINTS_PER_WINDOW for k in range(_POINTS_PER_WINDOW))

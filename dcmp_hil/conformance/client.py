@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _Answer = TypeVar("_Answer", bound="Message")
 
 ANSWER_TICKS = 200  # an answer takes no longer
-SESSIONS = 0xFFFF
+SESSION_MAX = 0xFFFF
 
 
 class Client(Listener):
@@ -101,7 +101,7 @@ class Client(Listener):
 
     def another_session(self) -> int:
         """Return a session number that has not been used yet."""
-        while (session := secrets.randbelow(SESSIONS) + 1) in self.sessions:
+        while (session := secrets.randbelow(SESSION_MAX) + 1) in self.sessions:
             pass
         return session
 

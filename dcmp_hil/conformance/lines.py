@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
 
 _READ_BYTES = 4096
-_BEL = 0x07
-_CR = 0x0D
+_SLCAN_REFUSAL_BYTE = 0x07
+_SLCAN_END_BYTE = 0x0D
 
 
 class RawPort(Protocol):
@@ -192,9 +192,9 @@ class SlcanLine:
         self._port.close()
 
     def _take(self, byte: int) -> None:
-        if byte == _BEL and not self._line:
+        if byte == _SLCAN_REFUSAL_BYTE and not self._line:
             self.answers.append(b"\a")
-        elif byte == _CR:
+        elif byte == _SLCAN_END_BYTE:
             line = bytes(self._line)
             self._line.clear()
             frames = slcan.SlcanDecoder().feed(line + b"\r")

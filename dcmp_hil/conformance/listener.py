@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
     from dcmp_hil.wire.messages import Message
 
-SILENCE_S = 2.0  # without a SAMPLE: the device is gone
-_AGE_US = 3000  # how old the SAMPLE may be that a DRIVE answers
+SILENCE_MAX_S = 2.0  # without a SAMPLE: the device is gone
+_SAMPLE_AGE_MAX_US = 3000  # how old the SAMPLE may be that a DRIVE answers
 _CLOCK_STEP_MAX_PERIODS = 0.3  # of a period, each period: by how much the two clocks may differ
 _BURST_FRAMES_MAX = 512  # frames that are read without a look at the end
 
@@ -112,7 +112,7 @@ class Listener:
             self._offset_us = offset_us
         else:
             self._offset_us = min(offset_us, self._offset_us + _CLOCK_STEP_MAX_PERIODS * self.period_us)
-        self.stalls += offset_us - self._offset_us > _AGE_US
+        self.stalls += offset_us - self._offset_us > _SAMPLE_AGE_MAX_US
 
     def listen(self, ticks: int = 1) -> list[Seen]:
         """Return the next `ticks` SAMPLEs.
@@ -120,19 +120,19 @@ class Listener:
         Raises
         ------
         SampleTimeoutError
-            If none came for SILENCE_S.
+            If none came for SILENCE_MAX_S.
         """
         first = len(self.samples)
-        deadline_ns = self.clock.now_ns() + int(1e9 * SILENCE_S)
+        deadline_ns = self.clock.now_ns() + int(1e9 * SILENCE_MAX_S)
         while len(self.samples) < first + ticks:
             before = len(self.samples)
             self.take(0.05)
             if len(self.samples) > before:
-                deadline_ns = self.clock.now_ns() + int(1e9 * SILENCE_S)
+                deadline_ns = self.clock.now_ns() + int(1e9 * SILENCE_MAX_S)
             elif self.clock.now_ns() >= deadline_ns:
                 raise SampleTimeoutError(
-                    f"{self.line.name}: no SAMPLE of node {self.node} for {SILENCE_S:g} s. Look at cable, "
-                    "baud rate, node and supply; `dcmp-hil ports` says what is there."
+                    f"{self.line.name}: no SAMPLE of node {self.node} for {SILENCE_MAX_S:g} s. Look at "
+                    "cable, baud rate, node and supply; `dcmp-hil ports` says what is there."
                 )
         return self.samples[first:]
 
@@ -162,7 +162,7 @@ class Listener:
     @property
     def reach(self) -> int:
         """Return the age, in periods, that the SAMPLE of a DRIVE may have."""
-        return -(-_AGE_US // self.period_us)
+        return -(-_SAMPLE_AGE_MAX_US // self.period_us)
 
     def periods(self, milliseconds: float) -> int:
         """Return a time in whole periods, rounded up."""

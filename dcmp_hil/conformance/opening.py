@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
-_LISTEN_S = 2.0  # a board that resets when its port is opened has booted by then
+_LISTEN_DURATION_S = 2.0  # a board that resets when its port is opened has booted by then
 _SAMPLES_MIN = 3  # SAMPLEs that are no accident
 
 
@@ -69,7 +69,7 @@ def _listen(port: SerialPort, node: int, clock: Clock) -> str:
     }
     samples = dict.fromkeys(receivers, 0)
     came = 0
-    deadline_ns = clock.now_ns() + int(1e9 * _LISTEN_S)
+    deadline_ns = clock.now_ns() + int(1e9 * _LISTEN_DURATION_S)
     while clock.now_ns() < deadline_ns:
         data = port.read(0.1)
         came += len(data)
@@ -79,8 +79,8 @@ def _listen(port: SerialPort, node: int, clock: Clock) -> str:
                 return carrier
     heard = f"{came} bytes came, but no SAMPLE of node {node}" if came else "nothing came"
     raise OpenError(
-        f"{port.name}: {heard} within {_LISTEN_S:g} s. Look at --baud, --node, cable and supply; name the "
-        "carrier by --link cobs or --link slcan if the device is silent until it is opened."
+        f"{port.name}: {heard} within {_LISTEN_DURATION_S:g} s. Look at --baud, --node, cable and supply; "
+        "name the carrier by --link cobs or --link slcan if the device is silent until it is opened."
     )
 
 

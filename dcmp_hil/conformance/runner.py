@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _ATTEMPTS_MAX = 5  # of a check during which this host was late
 _RELEASE_DRIVES = 5  # DRIVEs that ask for IDLE before STOP does
-_BRIEF_S = 0.02
+_PAUSE_S = 0.02
 _IDENTIFICATION_SAMPLES = 40  # SAMPLEs at the start: whether they are of one device
 _ARMED_STATES = (State.ARMING, State.RUN)
 
@@ -182,4 +182,4 @@ def _hear_a_little(client: Client) -> None:
     """Read the waiting messages, and up to three more; a device may be silent."""
     client.drain()
     for _ in range(3):
-        client.take(_BRIEF_S)
+        client.take(_PAUSE_S)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample
 
 
-_NO_FRICTION, _SERIES_BELOW = 1e-17, 1e-2  # of f0 T; below the first, 1 - f0 T is 1
+_NEGLIGIBLE_F0_PERIOD, _SERIES_F0_PERIOD_MAX = 1e-17, 1e-2  # of f0 T; below the first, 1 - f0 T is 1
 
 
 class Predictor:
@@ -71,10 +71,10 @@ def held_input(f0: float, period: float) -> tuple[float, float, float]:
     """
     a = math.exp(-f0 * period)
     x = f0 * period
-    if x < _NO_FRICTION:
+    if x < _NEGLIGIBLE_F0_PERIOD:
         return a, period, 0.5 * period * period
     p1 = -math.expm1(-x) / f0
-    if x > _SERIES_BELOW:
+    if x > _SERIES_F0_PERIOD_MAX:
         return a, p1, (period - p1) / f0
     # For small f0 T the closed form (T - p1)/f0 cancels; six terms are exact to double precision.
     series = 1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040))))

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-_STATES = 11
-_P, _V, _APPLIED, _SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, _NOISE = range(_STATES)
+_STATE_COUNT = 11
+_P, _V, _APPLIED, _SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, _NOISE = range(_STATE_COUNT)
 _GROWTH_MIN_1_S = 0.1  # 1/s: what grows more slowly than that is a drift
 _SLIDING_INNOVATION_COUNTS = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
 _GAIN_DECADES = 1.0  # that are searched
 _STEPS_PER_DECADE = 12
-_HALVINGS = 12  # refinements of the search
+_SEARCH_HALVINGS = 12  # refinements of the search
 _HISTORY_DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
-_FREQUENCY_MIN_RAD_S, _FREQUENCIES = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
+_FREQUENCY_MIN_RAD_S, _FREQUENCY_COUNT = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
 _UNMODELLED_RATIO = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
 
 
@@ -104,7 +104,7 @@ class LinearLoop:
 
     def matrix(self, motor: float = 1.0) -> Matrix:
         """Return what one period does to the state, with a motor so many times as strong as believed."""
-        return self._period(np.eye(_STATES), motor)
+        return self._period(np.eye(_STATE_COUNT), motor)
 
     def radius(self, motor: float = 1.0) -> float:
         """Return the largest magnitude of an eigenvalue; infinity where there is none."""
@@ -165,7 +165,7 @@ class LinearLoop:
         """Return margins of phase and delay and the peak of sensitivity; None where it is not stable."""
         if not self.stable():
             return None
-        w = np.geomspace(_FREQUENCY_MIN_RAD_S, math.pi / self._spec.period * (1.0 - 1e-9), _FREQUENCIES)
+        w = np.geomspace(_FREQUENCY_MIN_RAD_S, math.pi / self._spec.period * (1.0 - 1e-9), _FREQUENCY_COUNT)
         loop = self.response(w)
         size = np.log(np.abs(loop))
         at = np.flatnonzero(np.diff(np.sign(size)) != 0.0)
@@ -192,7 +192,7 @@ class LinearLoop:
             inside = k * step
         else:
             return float(10.0**inside)
-        for _ in range(_HALVINGS):
+        for _ in range(_SEARCH_HALVINGS):
             middle = 0.5 * (inside + outside)
             inside, outside = (middle, outside) if self.stable(10.0**middle) else (inside, middle)
         return float(10.0**inside)

@@ -11,7 +11,7 @@ from dcmp_hil.values import Reference
 if TYPE_CHECKING:
     from dcmp_hil.control.references import ReferenceSource
 
-LOWERING = 2.0  # s, from any position of the arm to hanging
+LOWERING_TIME_S = 2.0  # s, from any position of the arm to hanging
 _TRANSITION_TIME_MIN_S = 1.0  # s, from one reference into another, at least
 _TRANSITION_VELOCITY_MAX_RAD_S = 2.0  # that a change of position adds at most
 _TRANSITION_ACCELERATION_MAX_RAD_S2 = 10.0  # the same, of the acceleration
@@ -59,8 +59,8 @@ class Trajectory:
             self._plain_from = t + self._soft_start
 
     def lower(self, t: float) -> None:
-        """From `t` on, go down to position 0, hanging, in `LOWERING` seconds; nothing jumps."""
-        self._way_down = _Quintic(t, LOWERING, self.at(t))
+        """From `t` on, go down to position 0, hanging, in `LOWERING_TIME_S` seconds; nothing jumps."""
+        self._way_down = _Quintic(t, LOWERING_TIME_S, self.at(t))
         self._plain_from = math.inf
 
     def change(self, t: float, source: ReferenceSource) -> None:

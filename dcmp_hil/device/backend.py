@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.device import open_errors
-from dcmp_hil.device.client import MOST_WAITING, DeviceClient
+from dcmp_hil.device.client import SKIPPED_FRAMES_MAX, DeviceClient
 from dcmp_hil.device.device_config import DeviceConfig
 from dcmp_hil.device.disarm import DeviceEnd, DisarmSequence
 from dcmp_hil.device.handshake import Handshake
@@ -34,8 +34,8 @@ _SEQUENCE_MASK = 0x1FFF
 _RUN = int(State.RUN)
 _HEALTHY = Fault.NONE  # found here faster than in its class
 _MOST_mV = 32_767.0  # what 16 bits hold
-_MOST_LOST = 127  # periods that a tick of 8 bits can bridge
-_SURELY_NS = 200_000_000  # after which any watchdog has acted
+_LOST_PERIODS_MAX = 127  # periods that a tick of 8 bits can bridge
+_WATCHDOG_TIME_MAX_NS = 200_000_000  # after which any watchdog has acted
 _SILENT_PERIODS, _SILENT_S = 10, 20e-3  # no sample for the longer of the two: the end
 
 
@@ -70,7 +70,7 @@ class DeviceBackend:
         self._left = 0  # the fault that ended RUN
         self._ttl_ms = config.watchdog_ms
         self._memory = math.ceil(1e-3 * config.watchdog_ms / rig.period) + 2  # periods that a command holds
-        self._bridge_ns = int(_MOST_LOST * 1e9 * rig.period)
+        self._bridge_ns = int(_LOST_PERIODS_MAX * 1e9 * rig.period)
         self._heard_ns = 0
         self._forgotten = False  # the device has ended our session, and another host may own it
         self._answered = 0  # tick of the SAMPLE that was answered last
@@ -193,7 +193,7 @@ class DeviceBackend:
 
     def _give_up_after(self, gap_ns: int) -> NoReturn:
         """Raise after a gap in which periods can no longer be counted; the device has its watchdog."""
-        self._forgotten = gap_ns > _SURELY_NS
+        self._forgotten = gap_ns > _WATCHDOG_TIME_MAX_NS
         raise open_errors.stood_still(self._link.name, 1e-9 * gap_ns)
 
     def _next_report(self) -> SampleReport:
@@ -218,7 +218,7 @@ class DeviceBackend:
         return newest
 
     def _newest_after(self, newest: SampleReport) -> SampleReport:
-        for _ in range(MOST_WAITING):
+        for _ in range(SKIPPED_FRAMES_MAX):
             frame = self._link.receive(0.0) if newest.state == _RUN and self._link.pending else None
             if frame is None:
                 break

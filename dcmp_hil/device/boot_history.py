@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from dcmp_hil.device.client import DeviceClient
 
 _CAUSES = ("unknown", "power", "reset pin", "software", "watchdog", "brown-out")
-_WATCHDOG, _BROWN_OUT = 4, 5
+_WATCHDOG_CAUSE, _BROWN_OUT_CAUSE = 4, 5
 _REMEDIES = {
-    _WATCHDOG: "Its processor hung: look at what its firmware did last.",
-    _BROWN_OUT: "Its supply fell too low: look at the supply of its logic under load.",
+    _WATCHDOG_CAUSE: "Its processor hung: look at what its firmware did last.",
+    _BROWN_OUT_CAUSE: "Its supply fell too low: look at the supply of its logic under load.",
 }
 
 

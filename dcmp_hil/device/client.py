@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 _Answer = TypeVar("_Answer")
 
-MOST_WAITING = 512  # frames that are skipped for a newer one; a peer that floods is no reason to stay
-REPEAT = 0.05  # s, after which a question is asked again
-PATIENCE = 0.5  # s, for an answer in all
-_UNDER_WAY = 0.5  # s: a slow line may bring the first answer only now
-_LONG_UNDER_WAY = 1.0  # s: no answer comes later than that
-LONGEST_TRIP = 0.4  # s, for the answer to a question that is asked once
+SKIPPED_FRAMES_MAX = 512  # frames that are skipped for a newer one; a peer that floods is no reason to stay
+QUESTION_PERIOD_S = 0.05  # s, after which a question is asked again
+ANSWER_TIMEOUT_S = 0.5  # s, for an answer in all
+_SLOW_ANSWER_TIMEOUT_S = 0.5  # s: a slow line may bring the first answer only now
+_ANSWER_DELAY_MAX_S = 1.0  # s: no answer comes later than that
+SINGLE_ANSWER_TIMEOUT_S = 0.4  # s, for the answer to a question that is asked once
 
 
 class _Owed(NamedTuple):
@@ -118,7 +118,7 @@ class DeviceClient:
     def receive_sample(self, timeout: float) -> SampleReport | None:
         """Return the next SAMPLE, the newest where several are waiting; None after `timeout` (s)."""
         sample = self._until(timeout, SampleReport, lambda _: True)
-        for _ in range(MOST_WAITING):
+        for _ in range(SKIPPED_FRAMES_MAX):
             frame = self._link.receive(0.0)
             if frame is None:
                 break
@@ -132,13 +132,13 @@ class DeviceClient:
         """Ask, and ask again, until an answer of that type fits; None if none came in time."""
         key = _key_of_answer(question)
         self._await_owed(key)
-        for _ in range(round(PATIENCE / REPEAT)):
+        for _ in range(round(ANSWER_TIMEOUT_S / QUESTION_PERIOD_S)):
             self._ask_once(question, key)
-            found = self._until(REPEAT, answer, fits)
+            found = self._until(QUESTION_PERIOD_S, answer, fits)
             if found is not None:
                 break
         else:
-            found = self._until(_UNDER_WAY, answer, fits)
+            found = self._until(_SLOW_ANSWER_TIMEOUT_S, answer, fits)
         self._let_owed_come(key, answered=found is not None)
         return found
 
@@ -150,7 +150,7 @@ class DeviceClient:
         self._await_owed(key)
         began_ns = self._clock.now_ns()
         self._ask_once(question, key)
-        found = self._until(LONGEST_TRIP, answer, fits)
+        found = self._until(SINGLE_ANSWER_TIMEOUT_S, answer, fits)
         self._let_owed_come(key, answered=found is not None)
         return None if found is None else 1e-9 * (self._clock.now_ns() - began_ns)
 
@@ -172,7 +172,7 @@ class DeviceClient:
         """Answers follow one another as their questions did, 50 ms apart; the first may be long under way."""
         owed = self._owed.pop(key, None)
         if owed is not None and owed.answers > 0:
-            longest = REPEAT * (owed.answers + 1) if answered else _LONG_UNDER_WAY
+            longest = QUESTION_PERIOD_S * (owed.answers + 1) if answered else _ANSWER_DELAY_MAX_S
             until_ns = self._clock.now_ns() + int(1e9 * longest)
             self._owed[key] = _Owed(owed.answers, until_ns)
 

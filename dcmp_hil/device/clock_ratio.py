@@ -6,7 +6,7 @@ from collections import deque
 from statistics import median, quantiles
 
 _WINDOW_TICKS = 256  # ticks
-_NOISE_FREE_SPREAD = 2.5e-3  # of a slope: a spread that says nothing against the median
+_NOISE_FREE_SLOPE_SPREAD = 2.5e-3  # of a slope: a spread that says nothing against the median
 _SPREAD_RATIO_MAX = 1.1
 """Of the median: as much as a clock shows that goes wrong in the middle of what is looked at."""
 _SLOPES_MIN = 4  # fewer say nothing
@@ -51,7 +51,7 @@ class ClockRatio:
             return None
         longer = median(self._slopes)  # a nominal period takes so much longer than it should
         first, _, third = quantiles(self._slopes, n=4)
-        if third - first > max(_SPREAD_RATIO_MAX * abs(longer), _NOISE_FREE_SPREAD):
+        if third - first > max(_SPREAD_RATIO_MAX * abs(longer), _NOISE_FREE_SLOPE_SPREAD):
             return None  # this computer stood still too often to tell
         return 1.0 / (1.0 + longer) - 1.0
 

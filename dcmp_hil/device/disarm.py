@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.messages import SampleReport
 
 _ZERO_ANSWERS_MIN = 3  # answers at 0 V
-_PATIENCE_NS = 250_000_000
-_HEALTH_NS = 120_000_000  # HEALTH comes every 100 ms
+_ANSWER_TIMEOUT_NS = 250_000_000
+_HEALTH_TIMEOUT_NS = 120_000_000  # HEALTH comes every 100 ms
 _OF_THE_LINK = (Fault.HOST_SILENT, Fault.LINK_DOWN, Fault.CORRUPT_LINK)
 _AT_REST = (State.BOOT, State.IDLE, State.FAULT)
 
@@ -58,7 +58,7 @@ class DisarmSequence:
         if not answered:
             self._say(release=False)
             said = 1
-        deadline_ns = self._clock.now_ns() + _PATIENCE_NS
+        deadline_ns = self._clock.now_ns() + _ANSWER_TIMEOUT_NS
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             sample = self._client.receive_sample(1e-9 * left_ns)
             if sample is None:
@@ -76,7 +76,7 @@ class DisarmSequence:
         """Wait for the counters of a device that the link has brought to a fault: they show why."""
         if sample.state != State.FAULT or sample.fault_class not in _OF_THE_LINK:
             return
-        until_ns = self._clock.now_ns() + _HEALTH_NS
+        until_ns = self._clock.now_ns() + _HEALTH_TIMEOUT_NS
         while (left_ns := until_ns - self._clock.now_ns()) > 0:
             if isinstance(self._client.receive(1e-9 * left_ns), Health):
                 return

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
     from dcmp_hil.platform.clock import Clock
 
-LISTEN = 0.25  # s; a device sends every period, from boot on
+LISTEN_DURATION_S = 0.25  # s; a device sends every period, from boot on
 _TWO_DEVICES_LISTEN_S = 1.0  # s, longer where ticks are odd
 _TICK_MODULUS = 256
 _OTHER_FAULT_CLASS = 7  # fault class of every code from 7 on
-_ASKS_ONLY = 0  # the session of a HELLO that owns nothing
+_NO_SESSION = 0  # the session of a HELLO that owns nothing
 _DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
 _KEYS_ALWAYS_SHOWN = ("kind", "port", "interface", "channel")  # that a command names always
 _KEYS_WITH_DEFAULT = ("node", "baud", "bitrate")  # that it names where they are not the default
@@ -64,7 +64,7 @@ def find_devices(
     baud: int,
     bitrate: int,
     clock: Clock,
-    wait: float = LISTEN,
+    wait: float = LISTEN_DURATION_S,
     *,
     history: bool = False,
 ) -> Iterator[FoundDevice]:
@@ -208,20 +208,20 @@ def _hear_nodes(client: DeviceClient, clock: Clock, wait: float) -> dict[int, bo
             continue
         if ticks.get(node) == (sample.tick - 1) % _TICK_MODULUS:
             if not nodes:  # from the first on no longer than usual
-                deadline_ns = clock.now_ns() + int(1e9 * LISTEN)
+                deadline_ns = clock.now_ns() + int(1e9 * LISTEN_DURATION_S)
             nodes.add(node)
         ticks[node] = sample.tick
         watch = watches.setdefault(node, TickWatch())
         watch.add(sample)
         if watch.suspicious and not watch.two_devices:
-            deadline_ns = max(deadline_ns, min(longest_ns, clock.now_ns() + int(1e9 * LISTEN)))
+            deadline_ns = max(deadline_ns, min(longest_ns, clock.now_ns() + int(1e9 * LISTEN_DURATION_S)))
     twice = {node for node, watch in watches.items() if watch.two_devices}
     return {node: node in twice for node in sorted(nodes | twice)}
 
 
 def _describe(client: DeviceClient, node: int, *, twice: bool) -> str:
-    identity = client.request(Hello(_ASKS_ONLY, PROTOCOL_HASH), Identity)
-    sample = client.receive_sample(LISTEN)
+    identity = client.request(Hello(_NO_SESSION, PROTOCOL_HASH), Identity)
+    sample = client.receive_sample(LISTEN_DURATION_S)
     words = [f"node {node}"]
     if twice:
         words.append("TWO devices with this node (unplug one)")

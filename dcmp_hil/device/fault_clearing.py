@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.device import open_errors
-from dcmp_hil.device.client import PATIENCE
+from dcmp_hil.device.client import ANSWER_TIMEOUT_S
 from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import Drive, State, StopReason
@@ -75,7 +75,7 @@ class Clearing:
         if not self._allowed and self._waits_for_person(code):
             raise open_errors.latched(self._name, code)
         clear = False
-        deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
+        deadline_ns = self._clock.now_ns() + int(1e9 * ANSWER_TIMEOUT_S)
         while (left_ns := deadline_ns - self._clock.now_ns()) > 0:
             sample = self._client.receive_sample(1e-9 * left_ns)
             if sample is None:

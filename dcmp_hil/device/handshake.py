@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.device import open_errors
 from dcmp_hil.device.boot_history import history_of
-from dcmp_hil.device.client import PATIENCE
+from dcmp_hil.device.client import ANSWER_TIMEOUT_S
 from dcmp_hil.device.compatibility import differences, remarks
 from dcmp_hil.device.fault_clearing import Clearing
 from dcmp_hil.device.parameters import DeviceParameters
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
 
 _HELLO_ATTEMPTS, _OWNED_ANSWERS_MIN = 5, 2
-_ROUND_TRIPS = 5
+_ROUND_TRIP_MEASUREMENTS = 5
 _COMMAND_AGE_MAX_S = 3e-3  # s: a command older than that is refused by the device
 _TICK_JOIN_ATTEMPTS = 3  # attempts to match a SAMPLE with an answer to TICK
 _TICK_DIFFERENCE_MIN = -4  # ticks that a SAMPLE may differ from TICK
 _TICK_DIFFERENCE_MAX = 32  # the same, upper bound
 _HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
-_TWINS_S = 0.1
-_MANY_DAMAGED = 5  # frames, in a second
-_RELEASES, _NEXT_S = 3, 0.1
+_TWIN_LISTEN_DURATION_S = 0.1
+_DAMAGED_FRAMES_PER_SECOND_MAX = 5  # frames, in a second
+_RELEASE_ATTEMPTS, _NEXT_SAMPLE_TIMEOUT_S = 3, 0.1
 
 
 class Greeting(NamedTuple):
@@ -138,7 +138,7 @@ class Handshake:
     def _blamed(self, error: OpenError) -> OpenError:
         """Blame the line for it, where the line damages frames."""
         here, there = self._damaged - self._damaged_before, self._client.damaged_there
-        if max(here, there) < _MANY_DAMAGED:
+        if max(here, there) < _DAMAGED_FRAMES_PER_SECOND_MAX:
             return error
         return open_errors.damaged(self._link.name, here, there, error)
 
@@ -151,8 +151,9 @@ class Handshake:
         """Release the session, so that the next host need not wait until it lapses."""
         with contextlib.suppress(BackendError):
             self._parameters.get(Parameter.TICK)
-            for _ in range(_RELEASES):
-                self._client.receive_sample(_NEXT_S)  # a command must answer a newer one than the last did
+            for _ in range(_RELEASE_ATTEMPTS):
+                # A command must answer a newer SAMPLE than the last one did.
+                self._client.receive_sample(_NEXT_SAMPLE_TIMEOUT_S)
                 self._say(release=True)
 
     def _listen(self) -> None:
@@ -219,7 +220,7 @@ class Handshake:
     def _check_round_trip(self) -> None:
         """Refuse a line on which every command would be too old: a USB adapter may collect bytes."""
         best, waited = math.inf, False
-        for _ in range(_ROUND_TRIPS):
+        for _ in range(_ROUND_TRIP_MEASUREMENTS):
             trip = self._client.time_answer(ParameterGet(Parameter.TICK), ParameterValue, _is_tick)
             best, waited = min(best, trip or math.inf), waited or trip is None
             if best <= _COMMAND_AGE_MAX_S + 1e-6 * self._config.period_us:
@@ -233,7 +234,9 @@ class Handshake:
         """Raise if a second device has the same node number; listen longer if the ticks are odd."""
         ticks = self._client.ticks
         if ticks.suspicious:
-            self._client.listen(max(_TWINS_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us))
+            self._client.listen(
+                max(_TWIN_LISTEN_DURATION_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us)
+            )
         if ticks.two_devices:
             raise open_errors.two_devices(self._link.name, self._config.node)
 
@@ -241,7 +244,7 @@ class Handshake:
         """Refuse a device that puts out a voltage before it is armed."""
         said = ""
         for _ in range(_HOT_SAMPLES):
-            sample = self._client.receive_sample(PATIENCE)
+            sample = self._client.receive_sample(ANSWER_TIMEOUT_S)
             if sample is None or sample.state == State.RUN or sample.voltage_mV == 0:
                 return
             said = f"that it puts out {1e-3 * sample.voltage_mV:g} V and is not armed"
@@ -259,9 +262,9 @@ class Handshake:
 
     def _arm(self) -> None:
         """Answer SAMPLEs at 0 V until one says RUN."""
-        deadline_ns = self._clock.now_ns() + int(1e9 * PATIENCE)
+        deadline_ns = self._clock.now_ns() + int(1e9 * ANSWER_TIMEOUT_S)
         while self._clock.now_ns() < deadline_ns:
-            sample = self._client.receive_sample(PATIENCE)
+            sample = self._client.receive_sample(ANSWER_TIMEOUT_S)
             if sample is not None:
                 self._say(arm=True)
                 if sample.state == State.RUN:
@@ -269,7 +272,7 @@ class Handshake:
         self._check_alone()
         sample = self._client.sample
         state = State(sample.state).name if sample and sample.state in set(State) else "an unknown state"
-        raise open_errors.not_armed(self._link.name, state, PATIENCE)
+        raise open_errors.not_armed(self._link.name, state, ANSWER_TIMEOUT_S)
 
     def _say(self, *, arm: bool = False, release: bool = False) -> None:
         seq = self._client.tick & 0x1FFF
@@ -280,7 +283,7 @@ class Handshake:
         told = 0
         for _ in range(_TICK_JOIN_ATTEMPTS):
             told = self._parameters.get(Parameter.TICK)
-            if self._client.receive_sample(PATIENCE) is None:
+            if self._client.receive_sample(ANSWER_TIMEOUT_S) is None:
                 continue
             if _TICK_DIFFERENCE_MIN <= self._client.tick - told <= _TICK_DIFFERENCE_MAX:
                 return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.device.client import LONGEST_TRIP
+from dcmp_hil.device.client import SINGLE_ANSWER_TIMEOUT_S
 from dcmp_hil.errors import LinkError, OpenError, SampleTimeoutError
 from dcmp_hil.platform.host_info import contention
 from dcmp_hil.safety.device_faults import meaning_of, name_of
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.messages import ParameterValue
 
-_TIMER_S = 0.035  # two waits of an adapter's 16 ms, at most
+_ADAPTER_WAIT_MAX_S = 0.035  # two waits of an adapter's 16 ms, at most
 _FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
 
 
@@ -97,9 +97,13 @@ def owned(name: str) -> OpenError:
 
 def slow(name: str, seconds: float) -> NoAnswerError:
     """Make the error for answers that take too long; infinity for longer than was waited."""
-    took = f"{1e3 * seconds:.1f} ms" if seconds < math.inf else f"more than {1e3 * LONGEST_TRIP:.0f} ms"
+    took = (
+        f"{1e3 * seconds:.1f} ms"
+        if seconds < math.inf
+        else f"more than {1e3 * SINGLE_ANSWER_TIMEOUT_S:.0f} ms"
+    )
     said = f"{name}: an answer takes {took}, there and back, and commands older than 3 ms are refused."
-    if seconds > _TIMER_S:
+    if seconds > _ADAPTER_WAIT_MAX_S:
         return NoAnswerError(
             f"{said} No setting of an adapter makes so much: the line goes through something slow, such as a "
             "network, a radio or another program. Plug the device into this computer."

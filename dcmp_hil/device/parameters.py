@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.device import open_errors
-from dcmp_hil.device.client import PATIENCE
+from dcmp_hil.device.client import ANSWER_TIMEOUT_S
 from dcmp_hil.device.compatibility import COMPARED, is_possible
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterResult, ParameterSet, ParameterValue
 from dcmp_hil.wire.wrapping import unwrap
@@ -105,9 +105,9 @@ class DeviceParameters:
         """Return the count of an arm that hangs now: the middle one of three, so that a wrong one is none."""
         counts: list[int] = []
         while len(counts) < _COUNT_READINGS:
-            sample = self._client.receive_sample(PATIENCE)
+            sample = self._client.receive_sample(ANSWER_TIMEOUT_S)
             if sample is None:
-                raise open_errors.no_samples(self._name, PATIENCE, "nothing")
+                raise open_errors.no_samples(self._name, ANSWER_TIMEOUT_S, "nothing")
             counts.append(unwrap(counts[0] if counts else 0, sample.position_counts, 24))
         return sorted(counts)[_COUNT_READINGS // 2] % _COUNTS
 

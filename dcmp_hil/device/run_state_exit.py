@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.device.links.base import Link
     from dcmp_hil.platform.clock import Clock
 
-_OTHER_FAULT = 7  # fault_class that only says: see FAULT
+_OTHER_FAULT_CLASS = 7  # fault_class that only says: see FAULT
 _LISTENING_PERIODS, _TICK_DISTANCE_MAX = 3, 8  # how long is listened; ticks that follow the newest one
 
 
@@ -21,7 +21,7 @@ def why_left(report: SampleReport, told: int) -> int:
     """Return the fault in a SAMPLE that does not say RUN; `told` is the newest that FAULT named."""
     if report.fault_class == Fault.NONE:
         return Fault.DISARMED
-    if report.fault_class < _OTHER_FAULT:
+    if report.fault_class < _OTHER_FAULT_CLASS:
         return report.fault_class
     return told or Fault.UNKNOWN
 

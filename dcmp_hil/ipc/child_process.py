@@ -13,7 +13,7 @@ from dcmp_hil.platform.clock import MonotonicClock
 if TYPE_CHECKING:
     import socket
 
-MESSAGE = 1 << 16
+MESSAGE_BYTES_MAX = 1 << 16
 """Bytes of the longest."""
 _WORK_TIMEOUT_S = 60.0  # s that a process has which works at its answer
 
@@ -22,7 +22,7 @@ def receive(channel: socket.socket, within: float) -> bytes:
     """Return the next message; nothing if there is none in time, or never will be."""
     channel.settimeout(max(within, 1e-3))
     try:
-        return channel.recv(MESSAGE)
+        return channel.recv(MESSAGE_BYTES_MAX)
     except OSError:
         return b""
     finally:

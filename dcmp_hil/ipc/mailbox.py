@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.common.printable_text import readable
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.ipc.run_end import FORCED, SAID, UNCONFIRMED, WORD
+from dcmp_hil.ipc.run_end import FORCED, RUN_CODES, RUN_END_WORD, UNCONFIRMED
 
 if TYPE_CHECKING:
     import mmap
@@ -33,15 +33,15 @@ _HEADER_WORDS = 16  # of 8 bytes
 ) = range(12)
 _TIME = struct.Struct("d")
 _TIME_AT, _END_TEXT_AT, _SLOT_AT = 8 * _HEADER_WORDS, 256, 4096
-BELL = _BELL
+BELL_WORD = _BELL
 """Place of the number that tells the loop to look at the others."""
-SIZE = 1 << 16
+MAILBOX_BYTES = 1 << 16
 """Bytes of a mailbox."""
 
 APPLIED, LOWERING, FAILED = 1, 2, 3
 """Answers."""
 
-STOP = 256
+STOP_REQUEST = 256
 """Asks for the end where no signal did, whose numbers are smaller."""
 
 
@@ -61,7 +61,7 @@ class Mailbox:
     Parameters
     ----------
     memory
-        Of `SIZE` bytes, zeros at first; None allocates memory that is not shared.
+        Of `MAILBOX_BYTES` bytes, zeros at first; None allocates memory that is not shared.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Mailbox:
     """
 
     def __init__(self, memory: mmap.mmap | bytearray | None = None) -> None:
-        self.memory = bytearray(SIZE) if memory is None else memory
+        self.memory = bytearray(MAILBOX_BYTES) if memory is None else memory
         self.words = memoryview(self.memory)[: 8 * _HEADER_WORDS].cast("q")
 
     # ---------------------------------------------------------------- the side that asks
@@ -84,7 +84,7 @@ class Mailbox:
             If it is too long for the slot.
         """
         data = pickle.dumps(change)
-        if len(data) > SIZE - _SLOT_AT:
+        if len(data) > MAILBOX_BYTES - _SLOT_AT:
             raise ConfigError("The change is too long for its way to the loop. Change fewer keys at once.")
         self.memory[_SLOT_AT : _SLOT_AT + len(data)] = data
         self.words[_LENGTH], self.words[_CHECK] = len(data), zlib.crc32(data)
@@ -92,8 +92,8 @@ class Mailbox:
         self.ring_bell()
         return self.words[_ASKED]
 
-    def ask_stop(self, by: int = STOP) -> None:
-        """Ask the loop for the end of the run, in the name of a signal or of `STOP`; the first one counts."""
+    def ask_stop(self, by: int = STOP_REQUEST) -> None:
+        """Ask the loop for the end of the run, by a signal or by `STOP_REQUEST`; the first one counts."""
         self.words[_STOP] = self.words[_STOP] or by
         self.ring_bell()
 
@@ -104,7 +104,7 @@ class Mailbox:
 
     def ring_bell(self) -> None:
         """Make the loop read the rest of the mailbox."""
-        self.words[BELL] += 1
+        self.words[BELL_WORD] += 1
 
     @property
     def stop_taken(self) -> bool:
@@ -114,7 +114,7 @@ class Mailbox:
     @property
     def end(self) -> int:
         """Code of the run's end, such as `AT_ZERO`; `LIVES` during the run."""
-        return self.words[WORD]
+        return self.words[RUN_END_WORD]
 
     def tell_taken(self) -> None:
         """Note that the run has received the request to end."""
@@ -123,12 +123,12 @@ class Mailbox:
     @property
     def ended(self) -> bool:
         """Whether the run has ended by itself and said how."""
-        return self.words[WORD] in SAID
+        return self.words[RUN_END_WORD] in RUN_CODES
 
     def tell_forced(self) -> None:
         """Note that signals are sent; a run that still ends in order notes that later."""
         if not self.ended:
-            self.words[WORD] = FORCED
+            self.words[RUN_END_WORD] = FORCED
 
     def answer(self, number: int) -> Answer | None:
         """Return what became of the change of that number; None as long as the loop has not taken it."""
@@ -174,7 +174,7 @@ class Mailbox:
         return self.words[_ASKED]
 
     def take_stop(self) -> int:
-        """Return the signal that asks for the end, or `STOP`; 0 if nothing does. Say that it is known."""
+        """Return the signal that asks for the end, `STOP_REQUEST`, or 0 if nothing does; mark it as taken."""
         if self.words[_STOP]:
             self.tell_taken()
         return self.words[_STOP]
@@ -193,4 +193,4 @@ class Mailbox:
         data = readable(sentence).encode()[: _SLOT_AT - _END_TEXT_AT]
         self.memory[_END_TEXT_AT : _END_TEXT_AT + len(data)] = data
         self.words[_END_TEXT_LENGTH] = len(data)
-        self.words[WORD] = end
+        self.words[RUN_END_WORD] = end

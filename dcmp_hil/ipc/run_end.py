@@ -11,16 +11,16 @@ from dcmp_hil.errors import BackendError, ConfigError, OpenError
 LIVES, AT_ZERO, UNCONFIRMED, FORCED, NOT_ARMED = range(5)
 """Not yet; 0 V confirmed; 0 V not confirmed; signals were sent, as it did not answer STOP; this run has not
 armed the device, so that it does not know the voltage: another host may have."""
-SAID = (AT_ZERO, UNCONFIRMED, NOT_ARMED)
+RUN_CODES = (AT_ZERO, UNCONFIRMED, NOT_ARMED)
 """Codes that only the run itself writes."""
-WORD = 11
+RUN_END_WORD = 11
 """Place of the number in the memory, in words of 8 bytes."""
 _NUMBER = struct.Struct("q")
 
 
 def end_in(file: int) -> int:
     """Return the number in the memory of descriptor `file`; `LIVES` where there is none yet."""
-    data = os.pread(file, _NUMBER.size, WORD * _NUMBER.size)
+    data = os.pread(file, _NUMBER.size, RUN_END_WORD * _NUMBER.size)
     return int(_NUMBER.unpack(data)[0]) if len(data) == _NUMBER.size else LIVES
 
 

@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Protocol, cast
 
 from dcmp_hil.control.controllers import Gains
-from dcmp_hil.ipc.mailbox import APPLIED, BELL, FAILED, LOWERING, Answer
+from dcmp_hil.ipc.mailbox import APPLIED, BELL_WORD, FAILED, LOWERING, Answer
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase
 from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.safety.chatter import Chatter
 
-RAMP = 0.25  # s, over which gains go from old to new
+GAIN_RAMP_TIME_S = 0.25  # s, over which gains go from old to new
 _PLACES = {phase.value: place for place, phase in enumerate(Phase)}
 _LISTED_CHANGES_MAX = 1000  # changes that the summary lists
 _EVERY_CYCLE = -1  # no number of the bell: there is something to do every cycle
@@ -92,7 +92,7 @@ class LiveChanges:
         self._delay = delay
         self._notify, self._chatter = notify, chatter
         self._stop = stop or StopRequest()
-        self._seen = mailbox.words[BELL]
+        self._seen = mailbox.words[BELL_WORD]
         self._number = mailbox.asked
         self._handlers = mailbox.handlers_asked
         self._refused = False
@@ -102,7 +102,7 @@ class LiveChanges:
 
     def apply(self, t: float) -> None:
         """Apply what waits, between the period of device time `t` (s) and the next."""
-        if self._words[BELL] != self._seen:
+        if self._words[BELL_WORD] != self._seen:
             self._look(t)
 
     def event(self, event: Event) -> None:
@@ -117,7 +117,7 @@ class LiveChanges:
         self._seen = _EVERY_CYCLE
 
     def _look(self, t: float) -> None:
-        bell = self._words[BELL]  # before the rest: what comes meanwhile rings again
+        bell = self._words[BELL_WORD]  # before the rest: what comes meanwhile rings again
         if asked_by := self._mailbox.take_stop():
             self._stop.ask(asked_by)
         if self._mailbox.handlers_asked != self._handlers:
@@ -194,7 +194,7 @@ class _Ramp:
 
     def over(self, t: float) -> bool:
         """Set the gains of device time `t`, s; tell whether they are the wanted ones."""
-        s = min(max((t - self._t0) / RAMP, 0.0), 1.0)
+        s = min(max((t - self._t0) / GAIN_RAMP_TIME_S, 0.0), 1.0)
         kp, kd, compensation = (a + s * (b - a) for a, b in zip(self._from, self._wanted, strict=True))
         self._controller.gains = Gains(kp, kd, compensation) if s < 1.0 else self._wanted
         return s == 1.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of
-from dcmp_hil.live.stop_command import LIMIT, End, Stopped, is_alive, stop_run
+from dcmp_hil.live.stop_command import STOP_TIME_MAX_S, End, Stopped, is_alive, stop_run
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,7 +104,7 @@ def _exchange_stop(connection: socket.socket) -> Stopped:
     connection.sendall(json.dumps({"do": "stop"}).encode() + b"\n")
     with connection.makefile("rb") as lines:
         lines.readline()  # that it was understood
-        connection.settimeout(LIMIT)
+        connection.settimeout(STOP_TIME_MAX_S)
         try:
             reply = json.loads(lines.readline())
             return Stopped(End(reply["end"]), str(reply["said"]))

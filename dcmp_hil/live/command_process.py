@@ -13,7 +13,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from dcmp_hil.ipc.mailbox import SIZE, Mailbox
+from dcmp_hil.ipc.mailbox import MAILBOX_BYTES, Mailbox
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live.command_server import CommandSetup
 from dcmp_hil.platform.clock import MonotonicClock
@@ -62,7 +62,7 @@ class CommandProcess:
     ) -> None:
         self._listen, self.unattended = listen, unattended
         self._file, self._setup = reserve(self, "mailbox"), reserve(self, "command")
-        self.mailbox = Mailbox(mapped(self._file, SIZE))
+        self.mailbox = Mailbox(mapped(self._file, MAILBOX_BYTES))
         self.pid: int | None = None
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import DcmpError
-from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, STOP, Mailbox
+from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, MAILBOX_BYTES, STOP_REQUEST, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
 from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
-from dcmp_hil.live.connection_limits import BETWEEN, PATIENCE, ConnectionPool, listen
+from dcmp_hil.live.connection_limits import REQUEST_INTERVAL_MIN_S, REQUEST_TIMEOUT_S, ConnectionPool, listen
 from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.run_watch import RunWatch
 from dcmp_hil.live.state import state_of
@@ -98,9 +98,9 @@ class Server:
             if peer_of(connection)[1] != os.getuid():
                 return
             self._connections.admit(writer)
-            while line := await asyncio.wait_for(reader.readline(), PATIENCE):
+            while line := await asyncio.wait_for(reader.readline(), REQUEST_TIMEOUT_S):
                 await self._answer(json.loads(line), writer)
-                await asyncio.sleep(BETWEEN)
+                await asyncio.sleep(REQUEST_INTERVAL_MIN_S)
         except (
             OSError,  # a TimeoutError is one
             ValueError,
@@ -146,7 +146,7 @@ class Server:
             self._written, self._newest_ns = written, self._clock.now_ns()
         return os.getppid() == self._parent
 
-    def stop(self, by: int = STOP) -> asyncio.Task[Stopped]:
+    def stop(self, by: int = STOP_REQUEST) -> asyncio.Task[Stopped]:
         """End the run once, by force if it does not answer."""
         if self._stopping is None:
             self._stopping = asyncio.ensure_future(asyncio.to_thread(self._stop, by))
@@ -247,7 +247,7 @@ def main(line: int, setup: int, parent: int) -> None:
     with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:
         connection.setblocking(False)
         prepared: CommandSetup = pickle.load(file)  # noqa: S301 - written by our own parent
-        mailbox = Mailbox(mapped(prepared.mailbox, SIZE))
+        mailbox = Mailbox(mapped(prepared.mailbox, MAILBOX_BYTES))
         try:
             path = socket_of(parent) if prepared.listen else None
             asyncio.run(_serve(connection, Server(prepared, mailbox, parent), mailbox, path))

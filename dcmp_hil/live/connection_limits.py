@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
     Serve = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
-MANY = 128
+CONNECTIONS_MAX = 128
 """Connections at once; the oldest goes, but for one that waits for its STOP."""
-BETWEEN = 0.05  # s
+REQUEST_INTERVAL_MIN_S = 0.05  # s
 """Between two requests of one connection, at least."""
-PATIENCE = 2.0  # s
+REQUEST_TIMEOUT_S = 2.0  # s
 """For the next request of a connection."""
-_AT_ONCE = 32  # connections taken from the kernel: fewer than may wait, so that each can speak
+_ACCEPTS_AT_ONCE_MAX = 32  # connections taken from the kernel: fewer than may wait, so that each can speak
 _ACCEPT_QUEUE_MAX = 1024  # connections that the kernel keeps meanwhile
 
 
@@ -30,7 +30,7 @@ class ConnectionPool:
 
     def admit(self, writer: asyncio.StreamWriter) -> None:
         """Admit a connection; close the oldest if there are too many."""
-        if len(self._here) >= MANY:
+        if len(self._here) >= CONNECTIONS_MAX:
             oldest = next(iter(self._here))
             self.forget(oldest)
             oldest.transport.abort()
@@ -43,7 +43,7 @@ class ConnectionPool:
 
 async def listen(serve: Serve, path: Path, limit: int) -> asyncio.Server:
     """Listen at `path` for lines of at most `limit` bytes."""
-    server = await asyncio.start_unix_server(serve, path, limit=limit, backlog=_AT_ONCE)
+    server = await asyncio.start_unix_server(serve, path, limit=limit, backlog=_ACCEPTS_AT_ONCE_MAX)
     for listening in server.sockets:
         with socket.fromfd(listening.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as again:
             again.listen(_ACCEPT_QUEUE_MAX)

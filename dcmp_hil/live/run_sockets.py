@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.ipc.mailbox import SIZE, Mailbox
+from dcmp_hil.ipc.mailbox import MAILBOX_BYTES, Mailbox
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.platform.user_folder import private, temporary, usable
 
@@ -76,7 +76,7 @@ def mailbox_of(pid: int) -> Mailbox | None:
             if link.readlink().name.startswith(_MAILBOX):
                 file = os.open(link, os.O_RDWR)
                 try:
-                    return Mailbox(mapped(file, SIZE))
+                    return Mailbox(mapped(file, MAILBOX_BYTES))
                 finally:
                     os.close(file)
     return None

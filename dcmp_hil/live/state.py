@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
-FRESH = 0.5
+CYCLE_AGE_MAX_S = 0.5
 """s, how old the newest cycle of a run that goes on may be."""
 _PHASES = tuple(phase.value for phase in Phase)
 
@@ -30,9 +30,9 @@ def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -
     rig
         As it runs.
     age
-        s, since the newest row came. A run that is silent for longer than `FRESH` is in no phase.
+        s, since the newest row came. A run that is silent for longer than `CYCLE_AGE_MAX_S` is in no phase.
     """
-    silent = bool(row) and age > FRESH
+    silent = bool(row) and age > CYCLE_AGE_MAX_S
     state = {
         "rig": rig.name,
         "t_s": row.get("t"),

@@ -12,8 +12,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.ipc.mailbox import STOP
-from dcmp_hil.ipc.run_end import AT_ZERO, NOT_ARMED, SAID
+from dcmp_hil.ipc.mailbox import STOP_REQUEST
+from dcmp_hil.ipc.run_end import AT_ZERO, NOT_ARMED, RUN_CODES
 from dcmp_hil.platform.clock import MonotonicClock, pause
 
 if TYPE_CHECKING:
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
     from dcmp_hil.ipc.mailbox import Mailbox
 
-LIMIT = 1.0
+STOP_TIME_MAX_S = 1.0
 """s, within which STOP is confirmed or told as failed."""
-_NOT_TAKEN = (0.25, signal.SIGINT), (0.40, signal.SIGTERM), (0.60, signal.SIGKILL)
+_NOT_TAKEN_SCHEDULE_S = (0.25, signal.SIGINT), (0.40, signal.SIGTERM), (0.60, signal.SIGKILL)
 _SIGNAL_SCHEDULE_S = (0.50, signal.SIGINT), (0.60, signal.SIGTERM), (0.80, signal.SIGKILL)
 """s from STOP to each signal; a loop that has taken it has the time that a device takes to confirm 0 V."""
-_GIVEN_UP = 0.95  # s
+_STOP_WAIT_MAX_S = 0.95  # s
 _POLL_PERIOD_S = 0.002  # s
 
 
@@ -52,7 +52,7 @@ def stop_run(
     alive: Callable[[], bool],
     *,
     watchdog: str = "",
-    by: int = STOP,
+    by: int = STOP_REQUEST,
     late: float = 0.0,
 ) -> Stopped:
     """Ask for the end of a run and wait for its last words; where none come, end it by force.
@@ -81,11 +81,15 @@ def stop_run(
         if mailbox.ended:
             return _last_words(mailbox, after)
         if not alive():  # it may have said so meanwhile
-            return _gone(sent, after, watchdog) if mailbox.end not in SAID else _last_words(mailbox, after)
-        if after > _GIVEN_UP:
+            return (
+                _gone(sent, after, watchdog) if mailbox.end not in RUN_CODES else _last_words(mailbox, after)
+            )
+        if after > _STOP_WAIT_MAX_S:
             return _failed(pid)
         due = [
-            number for at, number in (_SIGNAL_SCHEDULE_S if mailbox.stop_taken else _NOT_TAKEN) if at <= after
+            number
+            for at, number in (_SIGNAL_SCHEDULE_S if mailbox.stop_taken else _NOT_TAKEN_SCHEDULE_S)
+            if at <= after
         ]
         for number in due[len(sent) :]:
             mailbox.tell_forced()

@@ -13,7 +13,7 @@ from dcmp_hil.live.tunables import allowed, settable, value_of
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
-_SLIDERS = {  # from, to; both above 0: by decades
+_SLIDER_RANGES = {  # from, to; both above 0: by decades
     "kp_1_s2": (100.0, 20_000.0),
     "kd_1_s": (10.0, 400.0),
     "L1_1_s": (0.5, 50.0),
@@ -29,9 +29,9 @@ _SLIDERS = {  # from, to; both above 0: by decades
     "at_s": (0.0, 60.0),
     "rest_s": (0.0, 10.0),
 }
-_HALVINGS, _RELATIVE_STEP = 12, 1e-3  # of the search; of a value, the nearest that is tried
+_SEARCH_HALVINGS, _RELATIVE_STEP = 12, 1e-3  # of the search; of a value, the nearest that is tried
 _SLIDER_MAX = 1e9  # of a key without a bound
-_ANGLES = (-3.0, 3.0)
+_ANGLE_RANGE_RAD = (-3.0, 3.0)
 _MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
 _NO_KIND = ("custom", "csv")
 
@@ -53,7 +53,7 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
     field = kind.model_fields[name]
     value = float(value_of(rig, key))
     low, high = within_reason(kind, name)
-    start, end = _SLIDERS.get(name, _ANGLES)
+    start, end = _SLIDER_RANGES.get(name, _ANGLE_RANGE_RAD)
     if name == "mu0_rad_s":
         high = min(high, 0.3 / rig.period)
         start, end = _MU0_SLIDER_MIN_RAD_S, high
@@ -81,7 +81,7 @@ def _end(rig: Rig, key: str, value: float, bound: float) -> float:
     if abs(far - value) <= near or not allowed(rig, key, value + way * near):
         return value
     inside, outside = math.log(near), math.log(abs(far - value))
-    for _ in range(_HALVINGS):
+    for _ in range(_SEARCH_HALVINGS):
         middle = 0.5 * (inside + outside)
         fits = allowed(rig, key, value + way * math.exp(middle))
         inside, outside = (middle, outside) if fits else (inside, middle)

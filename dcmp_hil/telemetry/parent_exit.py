@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import NamedTuple
 
-from dcmp_hil.ipc.run_end import FORCED, SAID, end_in
+from dcmp_hil.ipc.run_end import FORCED, RUN_CODES, end_in
 from dcmp_hil.platform.clock import MonotonicClock, pause
 
 _EXIT_TIMEOUT_S = 5.0  # s for a process whose line has gone to be gone as well
@@ -46,7 +46,7 @@ def how_it_died(mailbox: int | None, parent: int) -> Death | None:
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_EXIT_TIMEOUT_S * 1e9)
     while os.getppid() == parent:
-        if end_in(mailbox) in SAID or clock.now_ns() > end_ns:
+        if end_in(mailbox) in RUN_CODES or clock.now_ns() > end_ns:
             return None
         pause(_POLL_PERIOD_S)
     return _FORCED if end_in(mailbox) == FORCED else _DIED

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.ipc.child_process import MESSAGE
+from dcmp_hil.ipc.child_process import MESSAGE_BYTES_MAX
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.shared_memory import Ledger, mapped
 from dcmp_hil.platform import process_log
@@ -181,7 +181,7 @@ class _TelemetryWorker:
         """Receive what the parent sent; return whether that was the last."""
         while True:
             try:
-                message = self._channel.recv(MESSAGE, socket.MSG_DONTWAIT)
+                message = self._channel.recv(MESSAGE_BYTES_MAX, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 return False
             except OSError:

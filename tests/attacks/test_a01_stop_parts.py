@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.device.links.serial import open_port
-from dcmp_hil.ipc.mailbox import SIZE, STOP, Mailbox
+from dcmp_hil.ipc.mailbox import MAILBOX_BYTES, STOP_REQUEST, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
@@ -44,10 +44,10 @@ class _StoppedRun(ChangedRun):
             self.control.mailbox.ask_stop(self.by)
         return super()._read(k, sample)
 
-    by = STOP
+    by = STOP_REQUEST
 
 
-@pytest.mark.parametrize(("by", "said"), [(STOP, "STOP"), (signal.SIGTERM, "SIGTERM")])
+@pytest.mark.parametrize(("by", "said"), [(STOP_REQUEST, "STOP"), (signal.SIGTERM, "SIGTERM")])
 def test_stop_is_a_word_that_the_loop_takes_in_the_period(by: int, said: str) -> None:
     run = _StoppedRun({})
     run.by = by
@@ -98,7 +98,7 @@ def test_stop_that_changes_nothing_is_told_as_failed(monkeypatch: pytest.MonkeyP
     stopped = stop_run(1 << 22, Mailbox(), lambda: True)
     assert stopped.end is End.FAILED
     assert sent == [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
-    assert stop_command.LIMIT >= 1.0
+    assert stop_command.STOP_TIME_MAX_S >= 1.0
 
 
 class _Owner:
@@ -109,8 +109,10 @@ def test_state_is_silent_when_no_period_came_for_half_a_second(monkeypatch: pyte
     owner = _Owner()
     mailbox, ring = reserve(owner, "mailbox"), reserve(owner, "ring")
     rows = Ring(16, mapped(ring, size_of(16)))
-    server = Server(CommandSetup(bench(), mailbox, ring), Mailbox(mapped(mailbox, SIZE)), os.getpid())
-    Mailbox(mapped(mailbox, SIZE)).tell_phase(4)
+    server = Server(
+        CommandSetup(bench(), mailbox, ring), Mailbox(mapped(mailbox, MAILBOX_BYTES)), os.getpid()
+    )
+    Mailbox(mapped(mailbox, MAILBOX_BYTES)).tell_phase(4)
     rows.push(cycle(1.0, position=0.5, applied=2.0), Truth(0.0, 0.0, 0.0))
     server.look()
     fresh = server.state()
@@ -130,7 +132,7 @@ def test_end_of_a_run_is_told_by_what_it_said_and_whether_it_lives(
 ) -> None:
     owner = _Owner()
     file = reserve(owner, "mailbox")
-    mailbox = Mailbox(mapped(file, SIZE))
+    mailbox = Mailbox(mapped(file, MAILBOX_BYTES))
     if end == FORCED:
         mailbox.tell_forced()
     elif end == AT_ZERO:

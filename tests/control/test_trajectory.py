@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcmp_hil.control.references.periodic import Sine
-from dcmp_hil.control.trajectory import LOWERING, Trajectory
+from dcmp_hil.control.trajectory import LOWERING_TIME_S, Trajectory
 from dcmp_hil.values import Reference
 from tests.helpers import figures, known
 
@@ -73,8 +73,8 @@ def test_lowering_starts_where_the_reference_was_and_ends_hanging_at_rest() -> N
     trajectory.lower(start)
     assert trajectory.at(start).position == pytest.approx(there, abs=1e-12)
     assert trajectory.at(start + 1e-9).position == pytest.approx(there, abs=1e-8)
-    assert trajectory.at(start + LOWERING) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
-    assert trajectory.at(start + 10 * LOWERING) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert trajectory.at(start + LOWERING_TIME_S) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert trajectory.at(start + 10 * LOWERING_TIME_S) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     assert trajectory.at(start - 0.5) == _begun().at(start - 0.5), "the past stays what it was"
 
 
@@ -82,7 +82,7 @@ def test_lowering_starts_where_the_reference_was_and_ends_hanging_at_rest() -> N
 def test_lowering_moves_without_a_jump(start: float) -> None:
     trajectory = _begun()
     trajectory.lower(start)
-    h = LOWERING / 4000
+    h = LOWERING_TIME_S / 4000
     for k in range(-20, 4020):
         before, now, after = (trajectory.at(start + (k + i) * h) for i in (-1, 0, 1))
         # Less than 5 rad/s2 and 50 rad/s3 anywhere, so one step of 0.5 ms changes no more than this:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, SIZE, Answer, Mailbox
+from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, MAILBOX_BYTES, Answer, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
@@ -29,10 +29,10 @@ class _Rig:
 
     def __init__(self) -> None:
         files = [reserve(self, "mailbox"), reserve(self, "ring")]
-        self.mailbox = Mailbox(mapped(files[0], SIZE))
+        self.mailbox = Mailbox(mapped(files[0], MAILBOX_BYTES))
         self.ring = Ring(_ROWS, mapped(files[1], size_of(_ROWS)))
         setup = command_server.CommandSetup(bench(), files[0], files[1])
-        self.server = command_server.Server(setup, Mailbox(mapped(files[0], SIZE)), os.getpid())
+        self.server = command_server.Server(setup, Mailbox(mapped(files[0], MAILBOX_BYTES)), os.getpid())
         self.answer: int | None = APPLIED
 
     async def ask(self, place: Path, *requests: Any) -> list[Any]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.run_sockets import mailbox_of, running
-from dcmp_hil.live.stop_command import LIMIT, is_alive
+from dcmp_hil.live.stop_command import STOP_TIME_MAX_S, is_alive
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.recording.reader import read_run
 from tools.hosts import BOUND_S, wait
@@ -96,9 +96,9 @@ def _late(zero_s: float, answer_s: float, said: str, way: str) -> Iterator[str]:
     if zero_s > ZERO_S:
         yield f"0 V after {zero_s:.2f} s"
     after = re.search(r"after (\d+) ms", said)
-    if after and int(after[1]) > 1e3 * LIMIT:
+    if after and int(after[1]) > 1e3 * STOP_TIME_MAX_S:
         yield f"told after {after[1]} ms"
-    if way != "stop" and answer_s > LIMIT:  # a command takes its time to start
+    if way != "stop" and answer_s > STOP_TIME_MAX_S:  # a command takes its time to start
         yield f"told after {answer_s:.2f} s"
 
 

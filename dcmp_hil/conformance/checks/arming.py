@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-_DRIVES = 10
-LOW_MV = 300
+_DRIVES_UNTIL_RUN = 10
+LOW_VOLTAGE_MV = 300
 """mV, what most checks put out: enough to be seen in SAMPLE, too little to do harm."""
 
 
@@ -23,13 +23,13 @@ def to_run(client: Client) -> Iterator[str]:
     """Send nine DRIVEs, then ten."""
     session = client.own()
     for _ in range(2):  # the second time what was counted before counts no more
-        if _after(client, session, _DRIVES - 1) == State.RUN:
-            yield f"{_DRIVES - 1} DRIVEs lead from IDLE to RUN; ten are needed"
+        if _after(client, session, _DRIVES_UNTIL_RUN - 1) == State.RUN:
+            yield f"{_DRIVES_UNTIL_RUN - 1} DRIVEs lead from IDLE to RUN; ten are needed"
             return
         _disarm(client, session)
     for _ in range(10):  # one of ten may come too late
         first = client.mark()
-        state = _after(client, session, _DRIVES)
+        state = _after(client, session, _DRIVES_UNTIL_RUN)
         arming = [s.sample for s in client.samples[first:] if s.sample.state == State.ARMING]
         if any(sample.voltage_mV for sample in arming):
             yield "SAMPLE says a voltage other than 0 in ARMING"
@@ -124,7 +124,7 @@ def silent(client: Client) -> Iterator[str]:
         yield "silence in ARMING leads to FAULT; it leads to IDLE"
 
 
-def run(client: Client, session: int, voltage_mV: int = LOW_MV, ticks: int = 15) -> None:
+def run(client: Client, session: int, voltage_mV: int = LOW_VOLTAGE_MV, ticks: int = 15) -> None:
     """Arm, and put a voltage out for a while.
 
     Raises
@@ -149,7 +149,7 @@ def disarm(client: Client) -> Iterator[str]:
         run(client, session)
         client.newest()
         mark = client.mark()
-        client.drive(session, LOW_MV, **word)
+        client.drive(session, LOW_VOLTAGE_MV, **word)
         since = client.after_fence(mark)
         if client.state != State.IDLE:
             yield f"a DRIVE with {what} does not lead from RUN to IDLE"
@@ -183,17 +183,17 @@ def second_host(client: Client) -> Iterator[str]:
     run(client, session)
     other = client.another_session()
     client.newest()
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     found = client.hello(other)
     client.newest()
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     if found is not None and (found.owned or not found.busy):
         yield "a HELLO of a second host in RUN is not answered by busy"
     for _ in range(8):
         client.newest()
-        client.drive(session, LOW_MV, arm=True)
-        client.drive(other, -LOW_MV, arm=True)
-    seen = client.answer(3, session, LOW_MV)
+        client.drive(session, LOW_VOLTAGE_MV, arm=True)
+        client.drive(other, -LOW_VOLTAGE_MV, arm=True)
+    seen = client.answer(3, session, LOW_VOLTAGE_MV)
     if any(one.sample.voltage_mV < 0 for one in seen):
         yield "a DRIVE of a session that does not own the device was applied"
 

@@ -7,7 +7,7 @@ from binascii import crc_hqx
 from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
-from dcmp_hil.conformance.checks.frames import FULL
+from dcmp_hil.conformance.checks.frames import COUNTER_MAX
 from dcmp_hil.conformance.lines import CobsLine, SlcanLine
 from dcmp_hil.conformance.terms import COBS, SLCAN
 from dcmp_hil.wire import cobs, slcan
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def _counted(client: Client, before: int, expected: int, what: str) -> Iterator[str]:
     grown = client.health().crc_errors - before
-    if before + expected < FULL and grown != expected:
+    if before + expected < COUNTER_MAX and grown != expected:
         yield f"{what}: {expected} corrupt frames were sent, HEALTH.crc_errors grew by {grown}"
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-ROOM = 200  # a counter of HEALTH below this has room for what is sent here
+COUNTER_START_MAX = 200  # a counter of HEALTH below this has room for what is sent here
 _ATTEMPTS_MAX = 40
 
 
@@ -59,7 +59,7 @@ def refused(client: Client) -> Iterator[str]:
         if was_accepted(client, send):
             yield f"a DRIVE {what} was accepted"
     grown = client.health().sequence_gaps - before
-    if before < ROOM and grown:
+    if before < COUNTER_START_MAX and grown:
         yield f"DRIVEs that break rule 1 or 2 count as nothing, but sequence_gaps grew by {grown}"
 
 
@@ -73,7 +73,7 @@ def age(client: Client) -> Iterator[str]:
             what = f"{back} periods old" if back > 0 else f"{-back} periods ahead"
             yield f"a DRIVE was accepted whose SAMPLE is {what}; at most {client.reach} may pass"
     grown = client.health().sequence_gaps - before
-    if before < ROOM and grown != len(backs):
+    if before < COUNTER_START_MAX and grown != len(backs):
         yield f"{len(backs)} DRIVEs were too old or ahead, sequence_gaps grew by {grown}"
 
 
@@ -121,7 +121,7 @@ def order(client: Client) -> Iterator[str]:
     client.drive(session, back=1)
     client.after_fence(client.mark())
     grown = client.health().sequence_gaps - before
-    if before < ROOM and grown < 4:  # noqa: PLR2004 - four were sent
+    if before < COUNTER_START_MAX and grown < 4:  # noqa: PLR2004 - four were sent
         yield f"four DRIVEs came twice or too late, sequence_gaps grew by {grown}"
 
 

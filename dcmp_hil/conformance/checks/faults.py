@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-_REASON, _OTHER_REASON = 3, 1
+_STOP_REASON, _OTHER_STOP_REASON = 3, 1
 
 
 def stopped(client: Client, reason: int = 0) -> None:
@@ -35,7 +35,7 @@ def stop(client: Client) -> Iterator[str]:
     """Send STOP in IDLE, as a stranger, and listen to what the device says of it."""
     client.drain()
     at = len(client.heard)
-    client.stop(_REASON)
+    client.stop(_STOP_REASON)
     since = client.after_fence(len(client.samples))
     first = next((seen for seen in since if seen.sample.state == State.FAULT), None)
     if first is None:
@@ -45,14 +45,15 @@ def stop(client: Client) -> Iterator[str]:
         yield f"SAMPLE says fault_class {first.sample.fault_class} after STOP, the page 3"
     if first.fault is None:
         yield "no FAULT came before the first SAMPLE that says FAULT"
-    client.stop(_OTHER_REASON)
+    client.stop(_OTHER_STOP_REASON)
     client.listen(2 * client.periods(100) + 20)
     reports = [message for message in client.heard[at:] if isinstance(message, FaultReport)]
-    wrong = [one for one in reports if (one.code, one.detail) != (Fault.STOPPED, _REASON)]
+    wrong = [one for one in reports if (one.code, one.detail) != (Fault.STOPPED, _STOP_REASON)]
     if wrong:
         yield (
-            f"FAULT says code {wrong[0].code}, detail {wrong[0].detail} after STOP with reason {_REASON} and "
-            f"a second one with reason {_OTHER_REASON}; the first cause stays: code 3, detail {_REASON}"
+            f"FAULT says code {wrong[0].code}, detail {wrong[0].detail} after STOP with reason "
+            f"{_STOP_REASON} and a second one with reason {_OTHER_STOP_REASON}; the first cause stays: "
+            f"code 3, detail {_STOP_REASON}"
         )
     if reports and (reports[0].tick + 1) % 256 != first.tick % 256 and reports[0].tick != first.tick % 256:
         yield f"FAULT says tick {reports[0].tick}, the first SAMPLE that says FAULT is {first.tick % 256}"

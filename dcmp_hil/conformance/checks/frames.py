@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-FULL = 255  # a counter that stops counts nothing any more
+COUNTER_MAX = 255  # a counter that stops counts nothing any more
 _REPETITIONS = 3
 
 
@@ -53,7 +53,7 @@ def spoilt(client: Client) -> Iterator[str]:
         yield f"a question whose crc8 is wrong was answered: {answers[0]}"
     grown = client.health().crc_errors - before
     expected = 2 * _REPETITIONS + 2
-    if before + expected < FULL and grown != expected:
+    if before + expected < COUNTER_MAX and grown != expected:
         yield f"{expected} frames with a wrong crc8 were sent, HEALTH.crc_errors grew by {grown}"
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
-from dcmp_hil.conformance.checks.running import PUSH_MV, lower
+from dcmp_hil.conformance.checks.running import PUSH_VOLTAGE_MV, lower
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, Parameter, State
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
     from dcmp_hil.conformance.listener import Seen
 
-_WINDOW_MS, _MORE = 8.0, 1
+_SPEED_WINDOW_MS, _MOVEMENT_TOLERANCE_COUNTS = 8.0, 1
 """ms that a session's speed limit is taken over, and counts that may show more than it says."""
 _COUNTS = 2**24
 _FAR_COUNTS, _TRAVEL_LIMIT_COUNTS = 1000, 500
@@ -39,10 +39,10 @@ def _first_too_fast(client: Client, seen: Sequence[Seen], limit: int) -> int | N
     counts: list[int] = []
     for one in seen:
         counts.append(unwrap(counts[-1] if counts else 0, one.sample.position_counts, 24))
-    periods = client.periods(_WINDOW_MS)
+    periods = client.periods(_SPEED_WINDOW_MS)
     for end in range(periods + 2, len(counts)):
         moved = statistics.median(counts[end - k] - counts[end - k - periods] for k in range(3))
-        too_fast = (abs(moved) - _MORE) * 1_000_000 > limit * periods * client.period_us
+        too_fast = (abs(moved) - _MOVEMENT_TOLERANCE_COUNTS) * 1_000_000 > limit * periods * client.period_us
         if too_fast and seen[end].sample.state in (State.RUN, State.FAULT):
             return seen[end].tick
     return None
@@ -62,14 +62,14 @@ def speed(client: Client) -> Iterator[str]:
         client.newest()
         if client.state != State.RUN:
             break
-        client.drive(session, PUSH_MV * i // ramp, arm=True)
+        client.drive(session, PUSH_VOLTAGE_MV * i // ramp, arm=True)
     client.answer(3, session, 0)
     seen = client.samples[first:]
     due = _first_too_fast(client, seen, limit)
     fault = next((one.tick for one in seen if one.sample.state == State.FAULT), None)
     report = next((one for one in client.heard[at:] if isinstance(one, FaultReport)), None)
     if due is None and fault is None:
-        raise NotJudgedError(f"the arm does not move at {PUSH_MV} mV")
+        raise NotJudgedError(f"the arm does not move at {PUSH_VOLTAGE_MV} mV")
     if fault is None:
         yield f"under a speed limit of {limit} count/s the encoder moved, without a fault"
     elif report is not None and report.code != Fault.OVER_SPEED:

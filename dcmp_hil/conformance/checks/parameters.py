@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 _VALUE_MAX = 2**31 - 1
-_FIRST_ARMING = -1  # TRAVEL_ORIGIN_COUNTS that no session has set
+_UNSET_TRAVEL_ORIGIN_COUNTS = -1  # TRAVEL_ORIGIN_COUNTS that no session has set
 _UNKNOWN_PARAMETERS = (0, 17, 100, 255)
 _READ_ONLY = (
     *(Parameter.BOARD, Parameter.BOOT_COUNT, Parameter.RESET_CAUSE, Parameter.TICK),
@@ -40,7 +40,7 @@ _RANGES = {
     Parameter.EDGE_STAMPS: (0, 1),
     Parameter.LAST_FAULT: (0, 255),
     Parameter.SUPPLY_MV: (0, _VALUE_MAX),
-    Parameter.TRAVEL_ORIGIN_COUNTS: (_FIRST_ARMING, 2**24 - 1),
+    Parameter.TRAVEL_ORIGIN_COUNTS: (_UNSET_TRAVEL_ORIGIN_COUNTS, 2**24 - 1),
 }
 
 
@@ -143,8 +143,8 @@ def ranges(client: Client) -> Iterator[str]:
         (0, ParameterResult.OK),
         (2**24, ParameterResult.OUT_OF_RANGE),
         (2**24 - 1, ParameterResult.OK),
-        (_FIRST_ARMING - 1, ParameterResult.OUT_OF_RANGE),
-        (_FIRST_ARMING, ParameterResult.OK),
+        (_UNSET_TRAVEL_ORIGIN_COUNTS - 1, ParameterResult.OUT_OF_RANGE),
+        (_UNSET_TRAVEL_ORIGIN_COUNTS, ParameterResult.OK),
     ):
         yield from _tried(client, session, Parameter.TRAVEL_ORIGIN_COUNTS, value, expected)
     yield from _tried(client, session, Parameter.EDGE_STAMPS, 2, ParameterResult.OUT_OF_RANGE)

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
-from dcmp_hil.conformance.checks.arming import LOW_MV, run
-from dcmp_hil.conformance.checks.drives import ROOM
+from dcmp_hil.conformance.checks.arming import LOW_VOLTAGE_MV, run
+from dcmp_hil.conformance.checks.drives import COUNTER_START_MAX
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import FaultReport, Parameter, ParameterResult, State
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.conformance.client import Client
 
-PUSH_MV = 1000
+PUSH_VOLTAGE_MV = 1000
 """mV, for 300 ms at most: `travel-limit` and `speed-limit` alone wait for the arm to move."""
-_CORRUPT_LIMIT = 10
+_CORRUPT_FRAMES_LIMIT = 10
 
 
 def lower(client: Client, session: int, parameter: Parameter, value: int) -> None:
@@ -39,16 +39,16 @@ def voltage(client: Client) -> Iterator[str]:
     _no_slew(client)
     session = client.own()
     run(client, session)
-    for wanted in (LOW_MV, -LOW_MV, 0, LOW_MV // 2):
+    for wanted in (LOW_VOLTAGE_MV, -LOW_VOLTAGE_MV, 0, LOW_VOLTAGE_MV // 2):
         before = client.answer(6, session, wanted)[-1].sample.voltage_mV
         if before != wanted:
             yield f"a DRIVE of {wanted} mV is answered by {before} mV in SAMPLE"
     client.answer(6, session, 0)
     client.newest()
     mark = client.mark()
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     since = client.after_fence(mark)
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     accepted = next((seen.tick for seen in since if not seen.sample.missed), None)
     shown = next((seen.tick for seen in since if seen.sample.voltage_mV), None)
     if accepted is None:
@@ -69,27 +69,27 @@ def held(client: Client) -> Iterator[str]:
     mark = client.mark()
     client.listen(8)
     client.newest()
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     between = client.samples[mark + 2 : mark + 8]
     if client.state == State.FAULT:
         raise NotJudgedError("the watchdog was too quick: `watchdog` says more")
-    if any(seen.sample.voltage_mV != LOW_MV for seen in between):
+    if any(seen.sample.voltage_mV != LOW_VOLTAGE_MV for seen in between):
         yield "the voltage is not held in periods without a DRIVE"
     if not all(seen.sample.missed for seen in between):
         yield "SAMPLE says missed = 0 in RUN in periods without a DRIVE"
     client.drive(session)
     grown = client.health().sequence_gaps - before
-    if before < ROOM and grown < len(between):
+    if before < COUNTER_START_MAX and grown < len(between):
         yield f"{len(between)} periods in RUN were missed, sequence_gaps grew by {grown}; each counts"
 
 
 def clamp(client: Client) -> Iterator[str]:
     """Ask for more than the device's limit."""
     session = client.own()
-    limit = LOW_MV // 2
+    limit = LOW_VOLTAGE_MV // 2
     lower(client, session, Parameter.VOLTAGE_LIMIT_MV, limit)
     run(client, session, 0)
-    for wanted in (LOW_MV, -LOW_MV):
+    for wanted in (LOW_VOLTAGE_MV, -LOW_VOLTAGE_MV):
         last = client.answer(20, session, wanted)[-1].sample
         bounded = limit if wanted > 0 else -limit
         if last.voltage_mV != bounded:
@@ -106,13 +106,13 @@ def slew(client: Client) -> Iterator[str]:
     rate = 20
     lower(client, session, Parameter.SLEW_MV_PER_MS, rate)
     run(client, session, 0)
-    seen = client.answer(client.periods(15) + 3, session, LOW_MV)
+    seen = client.answer(client.periods(15) + 3, session, LOW_VOLTAGE_MV)
     step = rate * client.period_us / 1000
     rising = [one.sample.voltage_mV for one in seen if one.sample.voltage_mV]
     steps = [
         (new.sample.voltage_mV - old.sample.voltage_mV) / (new.tick - old.tick)
         for old, new in pairwise(seen)
-        if old.sample.voltage_mV and new.sample.voltage_mV < LOW_MV and new.tick > old.tick
+        if old.sample.voltage_mV and new.sample.voltage_mV < LOW_VOLTAGE_MV and new.tick > old.tick
     ]
     if not rising or abs(rising[0]) > 2 * step + 1:
         yield f"under a slew limit of {rate} mV/ms the voltage began with {rising[0] if rising else 0} mV"
@@ -131,22 +131,22 @@ def corrupt_link(client: Client) -> Iterator[str]:
             client.drive(session, arm=True, spoilt=True)
             client.drive(session, arm=True)
 
-    spoil(_CORRUPT_LIMIT - 1)
+    spoil(_CORRUPT_FRAMES_LIMIT - 1)
     client.answer(3, session)
     if client.state != State.RUN:
-        yield f"{_CORRUPT_LIMIT - 1} corrupt frames among 100 end RUN; ten do"
+        yield f"{_CORRUPT_FRAMES_LIMIT - 1} corrupt frames among 100 end RUN; ten do"
         return
     client.answer(client.periods(120), session)
     mark = client.mark()
-    spoil(_CORRUPT_LIMIT + 2)
+    spoil(_CORRUPT_FRAMES_LIMIT + 2)
     client.listen(2)
     fault = next((seen for seen in client.samples[mark:] if seen.sample.state == State.FAULT), None)
     if fault is None:
-        yield f"{_CORRUPT_LIMIT + 2} corrupt frames among 100 do not end RUN; ten do"
+        yield f"{_CORRUPT_FRAMES_LIMIT + 2} corrupt frames among 100 do not end RUN; ten do"
     elif fault.sample.fault_class != Fault.CORRUPT_LINK:
         yield f"corrupt frames in RUN lead to fault_class {fault.sample.fault_class}, the page says 4"
-    elif fault.fault is not None and fault.fault.detail != _CORRUPT_LIMIT:
-        yield f"FAULT(CORRUPT_LINK) says {fault.fault.detail} corrupt frames, not {_CORRUPT_LIMIT}"
+    elif fault.fault is not None and fault.fault.detail != _CORRUPT_FRAMES_LIMIT:
+        yield f"FAULT(CORRUPT_LINK) says {fault.fault.detail} corrupt frames, not {_CORRUPT_FRAMES_LIMIT}"
 
 
 def travel(client: Client) -> Iterator[str]:
@@ -160,14 +160,14 @@ def travel(client: Client) -> Iterator[str]:
         if client.state in (State.RUN, State.FAULT):
             break
         client.drive(session, arm=True)
-    client.answer(client.periods(300), session, PUSH_MV)
+    client.answer(client.periods(300), session, PUSH_VOLTAGE_MV)
     client.answer(2, session, 0)
     seen = client.samples[first:]
     moved = {one.sample.position_counts for one in seen if one.sample.state == State.RUN}
     report = next((one for one in client.heard[at:] if isinstance(one, FaultReport)), None)
     if report is None:
         if len(moved) <= 4:  # noqa: PLR2004 - the limit either way, and a count that trembles
-            raise NotJudgedError(f"the arm does not move at {PUSH_MV} mV")
+            raise NotJudgedError(f"the arm does not move at {PUSH_VOLTAGE_MV} mV")
         yield f"the encoder moved through {len(moved)} counts beyond a travel limit of 1, without a fault"
     elif report.code != Fault.OVER_TRAVEL:
         yield f"a travel limit of 1 count led to fault {report.code}, the page says 6"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
 
 _LEASE_MS = 500
-_NEAR_MS = 60  # a question at that distance of the end is safe on a slow line
+_LEASE_END_MARGIN_MS = 60  # a question at that distance of the end is safe on a slow line
 
 
 def _said(client: Client, session: int, expected: str, when: str, wrong: int = 0) -> Iterator[str]:
@@ -91,7 +91,7 @@ def repeated_hello(client: Client) -> Iterator[str]:
     client.drive(session)  # and still, after another HELLO
     client.after_fence(mark)
     grown = client.health().sequence_gaps - before
-    if before < _COUNTER_MAX and grown < 2:  # noqa: PLR2004 - two were sent
+    if before < _COUNTER_START_MAX and grown < 2:  # noqa: PLR2004 - two were sent
         yield "a DRIVE with the seq of the one before was accepted after the owner's second HELLO"
 
 
@@ -100,7 +100,7 @@ _SETTABLE = (
     *(Parameter.SPEED_LIMIT_COUNTS_S, Parameter.TRAVEL_LIMIT_COUNTS, Parameter.EDGE_STAMPS),
     Parameter.TRAVEL_ORIGIN_COUNTS,
 )
-_COUNTER_MAX = 240  # a counter of HEALTH below this has room
+_COUNTER_START_MAX = 240  # a counter of HEALTH below this has room
 
 
 def _accepted(client: Client, session: int) -> None:
@@ -151,12 +151,12 @@ def lease(client: Client) -> Iterator[str]:
     session = client.own()
     client.get(Parameter.TICK)
     asked = client.tick
-    client.listen(client.periods(_LEASE_MS - _NEAR_MS))
+    client.listen(client.periods(_LEASE_MS - _LEASE_END_MARGIN_MS))
     client.hello(session, 1)  # another hash, and
     answer = client.hello()  # session 0: both renew nothing
     if client.tick - asked < client.periods(_LEASE_MS) and answer is not None and not answer.busy:
         yield f"the ownership was over {client.tick - asked} periods after the owner's HELLO, before 500 ms"
-    client.listen(client.periods(2 * _NEAR_MS))
+    client.listen(client.periods(2 * _LEASE_END_MARGIN_MS))
     answer = client.hello()
     if answer is not None and answer.busy:
         yield (
@@ -165,7 +165,7 @@ def lease(client: Client) -> Iterator[str]:
         )
     session = client.own()
     for _ in range(3):  # a PARAMETER_SET counts, refused or not
-        client.listen(client.periods(_LEASE_MS - 2 * _NEAR_MS))
+        client.listen(client.periods(_LEASE_MS - 2 * _LEASE_END_MARGIN_MS))
         client.put(session, Parameter.TICK, 0)
     answer = client.hello()
     if answer is not None and not answer.busy:
@@ -197,7 +197,7 @@ def as_built(client: Client) -> Iterator[str]:
         client.hello(session if again else client.another_session())
         who = "the same session" if again else "another session"
         yield from _changed(client, built, f"when {who} is given the device")
-        client.listen(client.periods(_LEASE_MS + 2 * _NEAR_MS))
+        client.listen(client.periods(_LEASE_MS + 2 * _LEASE_END_MARGIN_MS))
 
 
 CHECKS = (

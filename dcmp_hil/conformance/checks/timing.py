@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.client import Client
     from dcmp_hil.conformance.listener import Seen
 
-_SILENT_S = 0.4
+_SILENCE_S = 0.4
 _CLOCK_RATIO_MIN = 0.5  # of the device's clock by this computer's: far beyond any crystal
 _CLOCK_RATIO_MAX = 2.0  # the same, upper bound
-_REQUESTS = 16
+_REQUESTS_AT_ONCE = 16
 _IDLE_PERCENT = 100
 
 
@@ -84,7 +84,7 @@ def counter_goes_on(client: Client) -> Iterator[str]:
     began_ns = clock.now_ns()
     if isinstance(line, SlcanLine):
         line.write(b"C\r")
-    clock.sleep_until_ns(began_ns + int(1e9 * _SILENT_S))
+    clock.sleep_until_ns(began_ns + int(1e9 * _SILENCE_S))
     client.forget_lateness()
     if isinstance(line, SlcanLine):
         line.write(b"O\r")
@@ -140,15 +140,15 @@ def answers(client: Client) -> Iterator[str]:
     """Ask sixteen questions at once."""
     client.drain()
     at = len(client.heard)
-    for _ in range(_REQUESTS):
+    for _ in range(_REQUESTS_AT_ONCE):
         client.send(ParameterGet(Parameter.PERIOD_US))
     client.settled_state()
     came = sum(
         isinstance(message, ParameterValue) and message.id == Parameter.PERIOD_US
         for message in client.heard[at:]
     )
-    if came != _REQUESTS:
-        yield f"{_REQUESTS} questions sent at once were answered {came} times"
+    if came != _REQUESTS_AT_ONCE:
+        yield f"{_REQUESTS_AT_ONCE} questions sent at once were answered {came} times"
 
 
 def edges(client: Client) -> Iterator[str]:

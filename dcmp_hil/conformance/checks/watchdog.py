@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import DeviceCheck
-from dcmp_hil.conformance.checks.arming import LOW_MV, run
+from dcmp_hil.conformance.checks.arming import LOW_VOLTAGE_MV, run
 from dcmp_hil.conformance.checks.running import lower
 from dcmp_hil.conformance.terms import NotJudgedError
 from dcmp_hil.values import Fault
@@ -67,7 +67,7 @@ def watchdog(client: Client) -> Iterator[str]:
         run(client, session)
         client.newest()
         mark = client.mark()
-        client.drive(session, LOW_MV, arm=True, ttl_ms=ttl_ms)
+        client.drive(session, LOW_VOLTAGE_MV, arm=True, ttl_ms=ttl_ms)
         bound = min(set_ms or built, ttl_ms)
         fault = client.wait_for(State.FAULT, client.periods(2 * bound + 30))
         client.listen(2)
@@ -95,7 +95,7 @@ def fed_by_nothing_else(client: Client) -> Iterator[str]:
     run(client, session)
     client.newest()
     mark = client.mark()
-    client.drive(session, LOW_MV, arm=True)
+    client.drive(session, LOW_VOLTAGE_MV, arm=True)
     at, other = client.tick, client.another_session()
     fault = None
     for _ in range(client.periods(2 * bound + 30)):
@@ -103,10 +103,10 @@ def fed_by_nothing_else(client: Client) -> Iterator[str]:
         if client.state == State.FAULT:
             fault = next(seen for seen in client.samples[mark:] if seen.sample.state == State.FAULT)
             break
-        client.drive(session, LOW_MV, arm=True, back=client.tick - at)  # the same seq again
-        client.drive(session, LOW_MV, arm=True, back=client.reach + 10)
-        client.drive(other, LOW_MV, arm=True)
-        client.drive(session, LOW_MV, arm=True, ttl_ms=51)
+        client.drive(session, LOW_VOLTAGE_MV, arm=True, back=client.tick - at)  # the same seq again
+        client.drive(session, LOW_VOLTAGE_MV, arm=True, back=client.reach + 10)
+        client.drive(other, LOW_VOLTAGE_MV, arm=True)
+        client.drive(session, LOW_VOLTAGE_MV, arm=True, ttl_ms=51)
         client.send(Hello(session, PROTOCOL_HASH))
     client.listen(2)
     yield from _bound(

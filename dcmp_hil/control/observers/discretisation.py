@@ -9,11 +9,12 @@ import numpy as np
 
 # Roots of s^3 + 2 s^2 + (3/sqrt 2) s + 1.1, the continuous differentiator's own polynomial with
 # lambda = (2, 1.5, 1.1): -r and -a +- i c.
-_R = 0.9806592527262586
-_A = 0.5096703736368707
-_C = 0.9284021317842834
-_NORM_MAX, _TERMS = 0.25, 11  # of the norm of A dt: the first term left out is below 1e-16 of the first
-_X_MAX = 50.0  # beyond it every exponential is 0 to double precision, and cos(inf) would raise
+_ROOT_R = 0.9806592527262586
+_ROOT_A = 0.5096703736368707
+_ROOT_C = 0.9284021317842834
+_NORM_MAX = 0.25  # of the norm of A dt
+_SERIES_TERMS = 11  # with it, the first term left out is below 1e-16 of the first
+_BANDWIDTH_STEP_MAX = 50.0  # beyond it every exponential is 0 to double precision, and cos(inf) would raise
 
 
 class ObserverGains(NamedTuple):
@@ -48,10 +49,10 @@ def matched_gains(x: float) -> ObserverGains:
         mu T, bandwidth times step; capped at 50, where the gains have reached (1, 1.5, 1).
         NaN gives NaN.
     """
-    x = min(x, _X_MAX)
-    d = -math.expm1(-_R * x)
-    m = math.exp(-2.0 * _A * x)
-    q = math.exp(-_A * x) * math.cos(_C * x)
+    x = min(x, _BANDWIDTH_STEP_MAX)
+    d = -math.expm1(-_ROOT_R * x)
+    m = math.exp(-2.0 * _ROOT_A * x)
+    q = math.exp(-_ROOT_A * x) * math.cos(_ROOT_C * x)
     e1 = 2.0 - 2.0 * q
     e0 = 1.0 - 2.0 * q + m
     p1 = d + e1
@@ -95,7 +96,7 @@ def copy_step(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
     a, b, c = 0.0, 1.0, 1.0  # A^k = a A + b I, and dt^k / k!
     e1 = i1 = d1 = 0.0  # what A is multiplied with: in exp(A dt), its integral, the integral of that
     e0 = i0 = d0 = 0.0  # and I
-    for k in range(_TERMS):
+    for k in range(_SERIES_TERMS):
         c1 = c * dt / (k + 1)
         c2 = c1 * dt / (k + 2)
         e1 += a * c

@@ -16,9 +16,9 @@ from dcmp_hil.values import Estimate, Sample
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
 
-_LONGEST_GAP = 10  # periods; after a longer one nothing is left to continue from
-_SAME_STEP = 0.02  # of a period: a step this close to a whole number of periods counts as that
-_WATCH_FACTOR, _WATCH_FASTEST = 2.5, 100.0  # times the rule; rad/s
+_GAP_PERIODS_MAX = 10  # periods; after a longer one nothing is left to continue from
+_STEP_TOLERANCE_PERIODS = 0.02  # of a period: a step this close to a whole number of periods counts as that
+_WATCH_BANDWIDTH_RATIO, _WATCH_BANDWIDTH_MAX_RAD_S = 2.5, 100.0  # times the rule; rad/s
 _INNOVATION_MIN_RAD = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
 
 
@@ -81,7 +81,11 @@ def watch_floor(counts_per_rev: float | None, period: float) -> float:
     One count of the encoder shows as a disturbance of about mu0^2 counts: an observer as fast as that on a
     coarse encoder would take the encoder's own steps for a push.
     """
-    return min(_WATCH_FASTEST, 0.3 / period, _WATCH_FACTOR * bandwidth_floor(counts_per_rev, period))
+    return min(
+        _WATCH_BANDWIDTH_MAX_RAD_S,
+        0.3 / period,
+        _WATCH_BANDWIDTH_RATIO * bandwidth_floor(counts_per_rev, period),
+    )
 
 
 def slope_bound(counts_per_rev: float | None) -> float:
@@ -124,7 +128,7 @@ class SuperTwisting:
         mu0: float | None = None,
     ) -> None:
         self._period = context.period
-        self._tolerance = _SAME_STEP * context.period
+        self._tolerance = _STEP_TOLERANCE_PERIODS * context.period
         self._shortest, self._longest = self._period - self._tolerance, self._period + self._tolerance
         self._f0, self._ku = context.model.f0, context.model.ku
         self._use(tune(context, L1=L1, L2=L2, M=M, mu0=mu0))
@@ -198,7 +202,7 @@ class SuperTwisting:
         """Return the coefficients for a step of another length; None if the state cannot be continued."""
         if dt <= 0.0:
             raise standing_still(self._t, self._t + dt)
-        if not dt < _LONGEST_GAP * self._period + self._tolerance:  # NaN: the first sample
+        if not dt < _GAP_PERIODS_MAX * self._period + self._tolerance:  # NaN: the first sample
             return None
         n = round(dt / self._period)
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
@@ -218,7 +222,7 @@ def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0
     counts, period, f0 = context.counts_per_rev, context.period, context.model.f0
     M = slope_bound(counts) if M is None else M
     mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
-    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, _LONGEST_GAP + 1)}
+    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, _GAP_PERIODS_MAX + 1)}
     return Tuning(L1, L2, M, mu0, gaps.pop(1), gaps)
 
 

@@ -14,7 +14,7 @@ from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.values import Reference
 
-_FEWEST_ROWS = 2
+_ROWS_MIN = 2
 
 
 class Table(ReferenceSettings):
@@ -47,7 +47,7 @@ class Table(ReferenceSettings):
             ) from None
         columns = read_columns(Path(self.file), ("time_s", "position_rad"))
         time = columns["time_s"]
-        if len(time) < _FEWEST_ROWS:
+        if len(time) < _ROWS_MIN:
             raise ConfigError(
                 f"{self.file}: a reference needs at least two rows, got {len(time)}. Add points."
             )

@@ -42,8 +42,8 @@ _BLOCKING_INTERFACES = (
 )  # they write without a bound: a frozen device would hold us
 _BUS_OFF = 0x40  # of the identifier of socketcan's error frames
 _DAMAGE_CLASSES = 0x08 | 0x10 | 0x80  # there: protocol violation, transceiver, bus error
-_MOST_FOREIGN = 64  # frames that are passed over in one look; a bus full of errors is no reason to stay
-_LOOK_NS = 100_000  # between two looks at an interface that cannot be waited on
+_FOREIGN_FRAMES_MAX = 64  # frames that are passed over in one look; a bus full of errors is no reason to stay
+_POLL_PERIOD_NS = 100_000  # between two looks at an interface that cannot be waited on
 
 
 def open_can(rig: Rig, clock: Clock) -> DeviceBackend:
@@ -163,7 +163,7 @@ class CanLink:
             return self._look() if self._poll.poll(1e3 * timeout) else None
         deadline_ns = self._clock.now_ns() + int(1e9 * timeout)
         while frame is None and (now_ns := self._clock.now_ns()) < deadline_ns:
-            self._clock.sleep_until_ns(min(now_ns + _LOOK_NS, deadline_ns))
+            self._clock.sleep_until_ns(min(now_ns + _POLL_PERIOD_NS, deadline_ns))
             frame = self._look()
         return frame
 
@@ -171,7 +171,7 @@ class CanLink:
         """Return a frame that is there; remote and extended ones are not ours."""
         bus = self._opened()
         try:
-            for _ in range(_MOST_FOREIGN):
+            for _ in range(_FOREIGN_FRAMES_MAX):
                 message = bus.recv(0.0)
                 if message is None:
                     return None

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 FAILURES = (serial.SerialException, OSError, termios.error, ValueError, TypeError)
 """What pyserial raises when a port fails: four unrelated types, TypeError if it was closed meanwhile."""
 
-_READ_BYTES = 4096
+_READ_BYTES_MAX = 4096
 _CARRIER_CHECK_BYTES = 16_384  # bytes, among which another carrier shows
 _DELIMITER = b"\0"
 
@@ -141,10 +141,10 @@ class SerialLink:
             if not self._poll.poll(1e3 * timeout):
                 self._more = False
                 return None
-            data = port.read(_READ_BYTES)
+            data = port.read(_READ_BYTES_MAX)
         except FAILURES as error:
             raise self._broken(error) from error
-        self._more = len(data) == _READ_BYTES
+        self._more = len(data) == _READ_BYTES_MAX
         frames.extend(self._receiver.feed(data))
         if self._unknown:
             self._keep_first(data)

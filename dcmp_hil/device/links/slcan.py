@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.frame import Frame
 
-_READ_BYTES = 4096
+_READ_BYTES_MAX = 4096
 _DEVICE_NAME_ANSWER = b"NDCMP\r"  # what a device of this project answers to N
 _NAME_ANSWER_BYTES_MAX = 16_384  # bytes, among which that answer is
 _BITRATES = {
@@ -107,7 +107,7 @@ class SlcanBus(can.BusABC):
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002
         if not self._frames:
-            data = self._port.read(_READ_BYTES)
+            data = self._port.read(_READ_BYTES_MAX)
             if len(self._first) < _NAME_ANSWER_BYTES_MAX:
                 self._first += data
             self._frames.extend(self._receiver.feed(data))
