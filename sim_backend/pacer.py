@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
 
-_FORGIVEN_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
+_BACKLOG_MAX_NS = 1_000_000_000  # so far behind, the pace starts afresh instead of being caught up
 
 
 class Pacer:
@@ -39,7 +39,7 @@ class Pacer:
     def missed(self, tick: int) -> int:
         """Count the ticks after `tick` whose instants have passed as well."""
         behind_ns = self._clock.now_ns() - self._start_ns - int(tick * self._period_ns + 0.5)
-        return int(behind_ns / self._period_ns) if 0 < behind_ns <= _FORGIVEN_NS else 0
+        return int(behind_ns / self._period_ns) if 0 < behind_ns <= _BACKLOG_MAX_NS else 0
 
     def wait_for(self, tick: int) -> None:
         """Return no earlier than the instant of `tick`."""
@@ -47,5 +47,5 @@ class Pacer:
         deadline_ns = self._start_ns + int(tick * self._period_ns + 0.5)
         self._clock.sleep_until_ns(deadline_ns)
         behind_ns = self._clock.now_ns() - deadline_ns
-        if behind_ns > _FORGIVEN_NS:
+        if behind_ns > _BACKLOG_MAX_NS:
             self._start_ns += behind_ns  # after a stop of the process: no burst of old periods

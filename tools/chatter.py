@@ -19,7 +19,7 @@ import numpy as np
 from dcmp_hil import load_rig, run
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.errors import ConfigError, DcmpError, TripError
-from dcmp_hil.safety.chatter import BLOCK, limit_V_s
+from dcmp_hil.safety.chatter import BLOCK_DURATION_S, limit_V_s
 from sim_backend.backend import SimBackend
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def variation_of(result: Result | None, period: float) -> float:
     if result is None or "voltage_sent_V" not in result.columns:
         return math.nan
     voltage, time = result.columns["voltage_sent_V"], result.columns["time_s"]
-    periods = max(1, round(BLOCK / period)) * _WINDOW
+    periods = max(1, round(BLOCK_DURATION_S / period)) * _WINDOW
     if len(voltage) <= periods:
         return 0.0
     way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(voltage)))))

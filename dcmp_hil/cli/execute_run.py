@@ -176,9 +176,9 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
 
         view = view_of(rig)
         if options.record is not None:
-            makers.append(partial(dashboard_replacing, view, options.record, viewer, window.PORT))
+            makers.append(partial(dashboard_replacing, view, options.record, viewer, window.VIEWER_PORT))
         else:
-            makers.append(partial(dashboard, view, own, viewer, window.PORT))
+            makers.append(partial(dashboard, view, own, viewer, window.VIEWER_PORT))
     return makers
 
 

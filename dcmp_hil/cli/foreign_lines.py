@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import streams
-from dcmp_hil.platform.process_log import STDERR, descriptor_of_stderr
+from dcmp_hil.platform.process_log import STDERR_FILENO, descriptor_of_stderr
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,13 +27,13 @@ def split_stderr(path: Path | None) -> Iterator[None]:
     path
         The file; None keeps nothing of it, and so does one that cannot be made.
     """
-    if descriptor_of_stderr() != STDERR:  # a program that calls us put another stream there
+    if descriptor_of_stderr() != STDERR_FILENO:  # a program that calls us put another stream there
         yield
         return
     before = sys.stderr
     before.flush()
-    terminal, file = os.dup(STDERR), _opened(path)
-    os.dup2(file, STDERR)
+    terminal, file = os.dup(STDERR_FILENO), _opened(path)
+    os.dup2(file, STDERR_FILENO)
     os.close(file)
     sys.stderr = streams.text_on(terminal)
     handler = logging.StreamHandler(before)
@@ -46,7 +46,7 @@ def split_stderr(path: Path | None) -> Iterator[None]:
         logging.getLogger().removeHandler(handler)
         before.flush()
         sys.stderr.flush()
-        os.dup2(terminal, STDERR)
+        os.dup2(terminal, STDERR_FILENO)
         sys.stderr = before
         os.close(terminal)
         if path is not None:

@@ -46,7 +46,7 @@ _TICK_JOIN_ATTEMPTS = 3  # attempts to match a SAMPLE with an answer to TICK
 _TICK_DIFFERENCE_MIN = -4  # ticks that a SAMPLE may differ from TICK
 _TICK_DIFFERENCE_MAX = 32  # the same, upper bound
 _HOT_SAMPLES = 5  # with a voltage, disarmed: the first ones may be those of a run that just ended
-_TWIN_LISTEN_DURATION_S = 0.1
+_TWIN_LISTEN_S = 0.1
 _DAMAGED_FRAMES_PER_SECOND_MAX = 5  # frames, in a second
 _RELEASE_ATTEMPTS, _NEXT_SAMPLE_TIMEOUT_S = 3, 0.1
 
@@ -152,8 +152,7 @@ class Handshake:
         with contextlib.suppress(BackendError):
             self._parameters.get(Parameter.TICK)
             for _ in range(_RELEASE_ATTEMPTS):
-                # A command must answer a newer SAMPLE than the last one did.
-                self._client.receive_sample(_NEXT_SAMPLE_TIMEOUT_S)
+                self._client.receive_sample(_NEXT_SAMPLE_TIMEOUT_S)  # a command must answer a newer SAMPLE
                 self._say(release=True)
 
     def _listen(self) -> None:
@@ -234,9 +233,7 @@ class Handshake:
         """Raise if a second device has the same node number; listen longer if the ticks are odd."""
         ticks = self._client.ticks
         if ticks.suspicious:
-            self._client.listen(
-                max(_TWIN_LISTEN_DURATION_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us)
-            )
+            self._client.listen(max(_TWIN_LISTEN_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us))
         if ticks.two_devices:
             raise open_errors.two_devices(self._link.name, self._config.node)
 

@@ -7,7 +7,7 @@ import signal
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
-from dcmp_hil.platform.stop_request import SIGNALS, TAKEN
+from dcmp_hil.platform.stop_request import SIGNALS, TAKEN_FLAG
 
 if TYPE_CHECKING:
     import socket
@@ -70,7 +70,7 @@ class RunWatch:
             asyncio.get_running_loop().remove_reader(self._line)
             self._closed.set()
         for number in numbers:
-            if number & ~TAKEN in SIGNALS:
-                _ = self._server.stop(number & ~TAKEN)
-            if number & TAKEN:
+            if number & ~TAKEN_FLAG in SIGNALS:
+                _ = self._server.stop(number & ~TAKEN_FLAG)
+            if number & TAKEN_FLAG:
                 self._mailbox.tell_taken()

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-DAY = 86_400.0  # s
+DAY_S = 86_400.0  # s
 
-_CELL_MAX = 400  # characters: a longer cell is text, and searching it would take long
+_CELL_CHARS_MAX = 400  # characters: a longer cell is text, and searching it would take long
 _SPACES = "\u00a0\u202f\u2009"
 _PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
@@ -53,7 +53,7 @@ def number(cell: str, decimal: str = ".") -> float:
     decimal
         ``.`` or ``,``.
     """
-    if len(cell) > _CELL_MAX:
+    if len(cell) > _CELL_CHARS_MAX:
         return math.nan
     text = cell.strip()
     if decimal == "." and _PLAIN.fullmatch(text):
@@ -88,7 +88,7 @@ def _finite(text: str) -> float:
 
 def unit_in(cell: str) -> str | None:
     """Return the unit that stands behind the number of a cell, if one does."""
-    dressed = _DRESSED.fullmatch(cell.strip()) if len(cell) <= _CELL_MAX else None
+    dressed = _DRESSED.fullmatch(cell.strip()) if len(cell) <= _CELL_CHARS_MAX else None
     tail = dressed and _TAIL.fullmatch(dressed["number"])
     return tail["unit"].strip() if tail and any_unit(tail["unit"]) else None
 
@@ -101,7 +101,7 @@ def label_in(cell: str) -> str | None:
 
 def is_clock(cell: str) -> bool:
     """Whether a cell holds a time of day, with or without a date."""
-    return ":" in cell and len(cell) <= _CELL_MAX and _CLOCK.fullmatch(cell.strip()) is not None
+    return ":" in cell and len(cell) <= _CELL_CHARS_MAX and _CLOCK.fullmatch(cell.strip()) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:
@@ -145,7 +145,7 @@ def clock_times(cells: Sequence[str]) -> NDArray[np.float64]:
     known = np.isfinite(times[:, 0])
     if known.any():
         times[:, 0] -= times[known, 0][0]
-    seconds: NDArray[np.float64] = times[:, 0] * DAY + times[:, 1]
+    seconds: NDArray[np.float64] = times[:, 0] * DAY_S + times[:, 1]
     return seconds
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import is_clock, numbers
 from dcmp_hil.offline.column_names import listed, match, sample_number, split_time
-from dcmp_hil.offline.dialect import HALF
+from dcmp_hil.offline.dialect import MAJORITY_SHARE
 
 if TYPE_CHECKING:
     from dcmp_hil.offline.column_names import Match
@@ -112,7 +112,7 @@ def _unnamed_time(table: TextTable) -> Match | None:
         return None
     cells = table.column("1")
     values = numbers(cells, table.decimal)
-    clocks = sum(map(is_clock, cells)) > HALF * len(cells)
+    clocks = sum(map(is_clock, cells)) > MAJORITY_SHARE * len(cells)
     steps = np.diff(values[np.isfinite(values)])
     rises = len(steps) > 0 and bool((steps > 0.0).all()) and float(np.median(steps)) != 1.0
     return match("time", table.header, "1", None) if clocks or rises else None

@@ -51,7 +51,7 @@ _WHOLE: dict[str, Quantity] = {
 }
 _WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
 _NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
-_NAMES_SHOWN = 30
+_SHOWN_NAMES_MAX = 30
 _NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
 _AMBIGUOUS_NAMES = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
@@ -222,8 +222,8 @@ def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
 
 def listed(names: Sequence[str], between: str = ", ") -> str:
     """Return names for a message, the first thirty of many."""
-    more = len(names) - _NAMES_SHOWN
-    shown = between.join(names[:_NAMES_SHOWN])
+    more = len(names) - _SHOWN_NAMES_MAX
+    shown = between.join(names[:_SHOWN_NAMES_MAX])
     return f"{shown} and {more} more" if more > 0 else shown
 
 

@@ -35,7 +35,7 @@ _OTHER_FILES = (
     (b"\x89MCAP", "an MCAP file"),
 )
 _ENCODING_SAMPLE_BYTES = 4096  # bytes that the encoding is told from
-_LINE_MAX = 1_000_000  # characters
+_LINE_CHARS_MAX = 1_000_000  # characters
 _FILE_MAX_MIB = 128  # an hour at 1 kHz in three columns; reading takes about 17 times as much memory
 _UTF16_NULS_SHARE_MIN = 0.3  # share of NULs on one side of UTF-16 text
 _CONTROL_CHARS_SHARE_MIN = 0.1  # share of control characters that no text has
@@ -94,7 +94,7 @@ def read_lines(path: Path) -> Lines:
     if nuls:
         notes.append(f"The file has {nuls} NUL characters: a number that holds one is left out.")
     lines = [line.strip("\0\x1a\ufeff") for line in _LINE_END.split(text)]
-    if (longest := max(map(len, lines))) > _LINE_MAX:
+    if (longest := max(map(len, lines))) > _LINE_CHARS_MAX:
         raise ConfigError(
             f"{path}: a line has {longest:,} characters, which no row of a recording has. Save it as "
             "comma-separated text, a row a sample."

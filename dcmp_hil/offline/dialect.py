@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _SAMPLE_LINES = 150  # lines that the layout is told from
-HALF = 0.5
+MAJORITY_SHARE = 0.5
 COMMENT = re.compile(r"\s*(?:#+|%+|//+|;+(?=\s*[A-Za-z#]))\s*")
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 _MONITOR = re.compile(r"(\[?\d{1,2}:\d{2}:\d{2}[.,]\d+\]?)\s*(?:->|>)\s*")  # a serial monitor's time stamp
@@ -61,7 +61,7 @@ def prepared(lines: Sequence[str]) -> tuple[list[tuple[int, str]], str]:
             continue
         kept.append((number, text))
     stamped = [_MONITOR.match(text) for _, text in kept[: _SAMPLE_LINES * 2]]
-    if sum(map(bool, stamped)) > HALF * len(stamped):
+    if sum(map(bool, stamped)) > MAJORITY_SHARE * len(stamped):
         kept = [(number, _unstamped(text)) for number, text in kept]
     return kept, forced
 
@@ -130,7 +130,9 @@ def _rated(sample: Sequence[str], delimiter: str, decimal: str) -> tuple[float, 
     """Return how well a layout explains the lines, from 0 to 1, and what it makes of them."""
     split_lines = [split(text, delimiter) for text in sample]
     values = [[is_value(field, decimal) for field in fields] for fields in split_lines]
-    likely = [k for k, row in enumerate(values) if sum(row) >= max(1, HALF * _filled(split_lines[k]))]
+    likely = [
+        k for k, row in enumerate(values) if sum(row) >= max(1, MAJORITY_SHARE * _filled(split_lines[k]))
+    ]
     if not likely:
         return None
     width = Counter(len(split_lines[k]) for k in likely).most_common(1)[0][0]
@@ -139,12 +141,14 @@ def _rated(sample: Sequence[str], delimiter: str, decimal: str) -> tuple[float, 
     rows = [k for k in likely if len(split_lines[k]) == width]
     share = [sum(values[k][column] for k in rows) / len(rows) for column in range(width)]
     filled = [sum(bool(split_lines[k][column]) for k in rows) / len(rows) for column in range(width)]
-    numeric = tuple(column for column in range(width) if share[column] >= HALF * max(filled[column], 0.1))
+    numeric = tuple(
+        column for column in range(width) if share[column] >= MAJORITY_SHARE * max(filled[column], 0.1)
+    )
     if not numeric:
         return None
     used = [column for column in range(width) if filled[column] > 0.0] or [0]
     clean = sum(share[column] / filled[column] for column in used) / len(used)
-    rating = clean * (len(rows) / len(sample)) * (1.0 if width > 1 else HALF)
+    rating = clean * (len(rows) / len(sample)) * (1.0 if width > 1 else MAJORITY_SHARE)
     return rating, Layout(delimiter, decimal, width, numeric)
 
 
@@ -192,4 +196,4 @@ def holds_numbers(fields: Sequence[str], layout: Layout, *, whole: bool = False)
     found = sum(is_value(fields[column], layout.decimal) for column in layout.numeric)
     empty = sum(not fields[column] for column in layout.numeric)
     filled = len(layout.numeric) - empty
-    return found >= 1 and (found == filled if whole else found >= HALF * filled)
+    return found >= 1 and (found == filled if whole else found >= MAJORITY_SHARE * filled)

@@ -17,12 +17,12 @@ _REPEATED_STAMPS_SHARE_MAX = 0.05
 """Share of the rows whose stamp may repeat the one before in a clock that is fine otherwise."""
 _STAMP_RESOLUTION_MAX_STEPS = 0.05  # of a step: stamps of that resolution are taken as they are
 _AVERAGE_ROWS = 64  # rows that a period is averaged over
-_SHORT_WINDOW = 10
+_SHORT_WINDOW_ROWS = 10
 _PERIOD_ROWS_MIN = 8  # rows that tell a period
-_PERIOD_TOLERANCE = 0.02  # between a period that is told and the one that the stamps show
+_PERIOD_TOLERANCE_SHARE = 0.02  # between a period that is told and the one that the stamps show
 _LOST_ROW_STEP_PERIODS = 0.75  # of a period, by which the stamps move on where a row was lost
-_COARSE_STEP_KINDS = 6  # of steps that a coarse clock shows
-_FEWEST_STAMPS = 50  # that tell a period to a thousandth
+_COARSE_STEP_KINDS_MAX = 6  # of steps that a coarse clock shows
+_STAMPS_MIN = 50  # that tell a period to a thousandth
 _ROUNDING_S = 1e-6  # s
 _TICKS_MAX = 1e15  # of them
 
@@ -90,7 +90,7 @@ def _coarse(time: Column, repeated: int, name: str, notes: list[str]) -> Column:
     resolution = float(np.quantile(steps[steps > 0.0], 0.95))
     grid = _fit(time, resolution)
     uneven = grid.spread > resolution + grid.period
-    if uneven or time[-1] - time[0] < _FEWEST_STAMPS * resolution:
+    if uneven or time[-1] - time[0] < _STAMPS_MIN * resolution:
         why = "the rows are not evenly sampled by them" if uneven else "there are too few different ones"
         raise ConfigError(
             f"{name}: {repeated} of {len(time)} stamps repeat the one before, and {why}, so they do not tell "
@@ -109,11 +109,11 @@ def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
     repeated = int(np.count_nonzero(steps <= 0.0))
     late = 2.0 * float(np.quantile(np.abs(steps - np.median(steps)), 0.9))
     resolution = max(late, float(np.quantile(steps[steps > 0.0], 0.95)) if repeated else 0.0)
-    few = time[-1] - time[0] < _FEWEST_STAMPS * resolution
+    few = time[-1] - time[0] < _STAMPS_MIN * resolution
     number = _numbered(time, period, resolution)
     off = time - period * number
     grid = _Grid(number, period, float(np.ptp(off))) if few else _fit(time, resolution, period)
-    if abs(grid.period / period - 1.0) > _PERIOD_TOLERANCE:
+    if abs(grid.period / period - 1.0) > _PERIOD_TOLERANCE_SHARE:
         raise ConfigError(
             f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {period:g} s. Leave "
             "--period out, or say --time none: then the stamps do not count."
@@ -139,7 +139,7 @@ def _fit(time: Column, resolution: float, told: float | None = None) -> _Grid:
     usual = float(np.median(means))
     near = np.abs(means - usual) <= (resolution + 0.5 * usual) / window
     # The mean is right where no row was lost, the smallest and the median step where some were.
-    short = min(_SHORT_WINDOW, len(time) - 1)
+    short = min(_SHORT_WINDOW_ROWS, len(time) - 1)
     fewest = float(np.quantile(time[short:] - time[:-short], 0.2)) / short
     mean = float(np.mean(means[near])) if near.any() else usual
     guesses = [mean, fewest, float(np.median(np.diff(time))), told or 0.0]
@@ -178,7 +178,7 @@ def _numbered(time: Column, period: float, resolution: float) -> Column:
 def _resolution(steps: Column) -> float:
     """Return the step of a coarse clock, s; 0 where the steps do not come in a few sizes."""
     sizes = np.unique(np.round(steps / _ROUNDING_S))
-    if not 1 < len(sizes) <= _COARSE_STEP_KINDS or sizes[-1] > _TICKS_MAX:
+    if not 1 < len(sizes) <= _COARSE_STEP_KINDS_MAX or sizes[-1] > _TICKS_MAX:
         return 0.0
     return float(np.gcd.reduce(sizes.astype(np.int64))) * _ROUNDING_S
 

@@ -17,7 +17,7 @@ _EMPTY_CELLS_SHARE_MIN = 0.05
 """Share of empty cells from which an input was written less often than the position."""
 _PULSE_ROWS_MAX = 2  # rows, one behind the other
 _OUTLIER_RATIO = 20.0  # times the largest of the other rows
-_LARGE_INPUT = 60.0  # V or N m: below it a short pulse can have been meant
+_LARGE_INPUT_MIN = 60.0  # V or N m: below it a short pulse can have been meant
 _FEW_ROWS_SHARE = 0.001  # share of rows
 
 
@@ -60,7 +60,7 @@ def undamaged(values: Column, size: float, name: str, notes: list[str]) -> Colum
     others = known[: len(known) - max(1, int(_FEW_ROWS_SHARE * len(known)))]
     if not len(others):
         return values
-    far = amount > max(_LARGE_INPUT, _OUTLIER_RATIO * float(others[-1]))
+    far = amount > max(_LARGE_INPUT_MIN, _OUTLIER_RATIO * float(others[-1]))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
     if not len(edges) or int(np.max(edges[1::2] - edges[::2])) > _PULSE_ROWS_MAX:
         return values

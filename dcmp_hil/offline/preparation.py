@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _PERIOD_MIN_S = 1e-6  # s: a shorter period is a wrong unit
 _USUAL_COUNTS = 4096.0  # where the recording tells nothing
-_PAPER_M = 1000.0  # rad/s3
+_PAPER_M_RAD_S3 = 1000.0  # rad/s3
 
 
 class Preparation(NamedTuple):
@@ -126,7 +126,7 @@ def _make(settings: ReplaySettings, setting: ObserverContext) -> Observer:
     if settings.observer == "super_twisting":
         return SuperTwisting(setting, L1=settings.L1, L2=settings.L2, M=settings.M, mu0=settings.mu0)
     if settings.observer == "paper":
-        M = _PAPER_M if settings.M is None else settings.M
+        M = _PAPER_M_RAD_S3 if settings.M is None else settings.M
         return PaperObserver(setting, L1=settings.L1, L2=settings.L2, M=M, from_zero=settings.from_zero)
     find = find_named(settings.observer, "--observer", ("super_twisting", "paper"), settings.folders)
     role = OBSERVER._replace(key="--observer")

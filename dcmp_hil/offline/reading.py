@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-_TURN = 2.0 * np.pi
-_MOST_SHOWN = 5
-_HALF = 0.5
+_TURN_RAD = 2.0 * np.pi
+_SHOWN_FAULTS_MAX = 5
+_MAJORITY_SHARE = 0.5
 _VALUE_MAX = 1e12  # in any unit: beyond it a number is an overflow
-_WHOLE_RADIANS = 50.0  # a span of whole numbers that no recording in rad has
+_WHOLE_NUMBER_SPAN_MAX_RAD = 50.0  # a span of whole numbers that no recording in rad has
 
 
 class _Values(NamedTuple):
@@ -135,7 +135,7 @@ def _time(
     column = columns.time
     assert column is not None  # noqa: S101 - the caller has looked
     cells = table.column(column.column)
-    if sum(map(is_clock, cells)) > _HALF * len(cells):
+    if sum(map(is_clock, cells)) > _MAJORITY_SHARE * len(cells):
         found = column._replace(unit="s", size=1.0, source="values")
         return clock_times(cells), columns._replace(time=found), options.period
     stamps = numbers(cells, table.decimal)
@@ -183,7 +183,7 @@ def _known(table: TextTable, columns: Columns, values: _Values, notes: list[str]
     faults = [
         f"{table.path}, row {row + 1} (line {table.lines[row]}), column {name}: "
         f"{_shown(table.column(name)[row])} is no finite number"
-        for row in np.flatnonzero(bad)[:_MOST_SHOWN].tolist()
+        for row in np.flatnonzero(bad)[:_SHOWN_FAULTS_MAX].tolist()
         for name, where in missing.items()
         if where[row]
     ]
@@ -192,10 +192,12 @@ def _known(table: TextTable, columns: Columns, values: _Values, notes: list[str]
         for name, where in missing.items()
         for row in np.flatnonzero(where).tolist()
     )
-    if count == len(bad) or garbage > _HALF * len(bad):
+    if count == len(bad) or garbage > _MAJORITY_SHARE * len(bad):
         more = [f"... in {count} of {len(bad)} rows"] if count > 1 else []
         raise ConfigError(
-            *faults[:_MOST_SHOWN], *more, "Check the columns: --time, --position, --torque or --voltage."
+            *faults[:_SHOWN_FAULTS_MAX],
+            *more,
+            "Check the columns: --time, --position, --torque or --voltage.",
         )
     said = ", ".join(f"{name} ({int(where.sum())})" for name, where in missing.items() if where.any())
     notes.append(
@@ -244,7 +246,7 @@ def _position(
 
 def _guessed(column: Match, raw: Column, options: ColumnOptions) -> tuple[Match, tuple[str, ...]]:
     """Return the unit of a position without one in its name, by its values: rad if possible."""
-    if len(raw) and (raw == np.round(raw)).all() and np.ptp(raw) > _WHOLE_RADIANS:
+    if len(raw) and (raw == np.round(raw)).all() and np.ptp(raw) > _WHOLE_NUMBER_SPAN_MAX_RAD:
         if options.counts_per_rev is None:
             raise ConfigError(
                 f'The position "{column.column}" holds whole numbers, which are no radians. Say their unit: '
@@ -268,7 +270,7 @@ def _size(column: Match, options: ColumnOptions) -> float:
         raise ConfigError(
             f'The position "{column.column}" is in counts. Say how many make a turn: --counts-per-rev N.'
         )
-    return _TURN / options.counts_per_rev
+    return _TURN_RAD / options.counts_per_rev
 
 
 def _applied(columns: Columns) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.offline.settings import InputKind
     from dcmp_hil.offline.unwrapping import Modulus
 
-_FEWEST_ROWS = 20
+_ROWS_MIN = 20
 _VALUE_MAX = 1e6  # rad, N m, V, rad/s: beyond it a unit or a column is wrong
 
 
@@ -106,10 +106,10 @@ class LoggedSignals:
             given["velocity"] = self.velocity
         if len({len(values) for values in given.values()}) > 1:
             raise ConfigError(f"{self.name}: columns of different lengths. Give each one value a row.")
-        if len(self.time) < _FEWEST_ROWS:
+        if len(self.time) < _ROWS_MIN:
             raise ConfigError(
                 f"{self.name}: {len(self.time)} rows are too few to judge an observer by; "
-                f"at least {_FEWEST_ROWS} are needed. Record longer."
+                f"at least {_ROWS_MIN} are needed. Record longer."
             )
         faults = [fault for name, values in given.items() if (fault := self._unbelievable(name, values))]
         if faults:

@@ -16,8 +16,8 @@ _STEPS_MIN = 10  # steps to judge a candidate by
 _FITTING_STEPS_SHARE_MIN = 0.95  # of the steps; a few may be glitches
 _MISFIT_MAX_COUNTS = 0.15  # counts; 30 % of random steps would pass
 
-_TURN = 2.0 * np.pi
-_MOST_COUNTS = 2.0**24
+_TURN_RAD = 2.0 * np.pi
+_COUNTS_PER_REV_MAX = 2.0**24
 
 
 def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
@@ -50,7 +50,7 @@ def estimate_counts_per_rev(position: NDArray[np.float64]) -> float | None:
         multiples = np.round(short / candidate)
         fits = np.abs(short / candidate - multiples) < _MISFIT_MAX_COUNTS
         if len(short) >= _STEPS_MIN and np.mean(fits) >= _FITTING_STEPS_SHARE_MIN:
-            return float(_TURN / np.median(short[fits] / multiples[fits]))
+            return float(_TURN_RAD / np.median(short[fits] / multiples[fits]))
     return None
 
 
@@ -74,4 +74,4 @@ def equivalent_counts_per_rev(position: NDArray[np.float64]) -> float | None:
     scatter = 1.4826 * float(np.median(np.abs(np.diff(position, 3)))) / np.sqrt(20.0)
     if scatter <= 0.0:
         return None
-    return float(min(_TURN / (np.sqrt(12.0) * scatter), _MOST_COUNTS))
+    return float(min(_TURN_RAD / (np.sqrt(12.0) * scatter), _COUNTS_PER_REV_MAX))

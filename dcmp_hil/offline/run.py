@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.offline.recording import LoggedSignals
 
-_LONGEST_GAP = 10.02  # periods: the observers restart after a longer one
+_GAP_PERIODS_MAX = 10.02  # periods: the observers restart after a longer one
 _ROUNDING_S = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
 _ESTIMATE_MAX = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
 
@@ -80,7 +80,7 @@ def replay(recording: LoggedSignals, settings: ReplaySettings | None = None) -> 
     """
     settings = settings or ReplaySettings()
     set_up = prepare(recording, settings)
-    period, gap = set_up.setting.period, _LONGEST_GAP * set_up.setting.period
+    period, gap = set_up.setting.period, _GAP_PERIODS_MAX * set_up.setting.period
     begins = recording.begins(gap)
     reference = zero_phase(
         recording.time,

@@ -13,7 +13,7 @@ from dcmp_hil.offline.decoding import read_lines
 from dcmp_hil.offline.dialect import (
     BLANK,
     COMMENT,
-    HALF,
+    MAJORITY_SHARE,
     comma_pairs,
     find_layout,
     holds_numbers,
@@ -145,7 +145,7 @@ def _names(above: Sequence[Line], layout: Layout) -> tuple[list[str], list[str],
             if not units and place > 0 and _are_units(words, layout):
                 units = fields
                 break
-            if words and sum(is_value(word, layout.decimal) for word in words) < HALF * len(words):
+            if words and sum(is_value(word, layout.decimal) for word in words) < MAJORITY_SHARE * len(words):
                 if nearest is None and known_in(fields):
                     return fields, units, _text(above[:place])
                 if nearest is not None and known_in(fields) > 1:  # such as names above those of the sensors
@@ -180,7 +180,7 @@ def _are_units(fields: Sequence[str], layout: Layout) -> bool:
     words = [field for field in fields if not is_value(field, layout.decimal)]
     bracketed = sum(bool(re.fullmatch(r"\(.*\)|\[.*\]", word)) for word in words)
     known = sum(any_unit(word) or word in ("-", "%", "1") for word in words)
-    return bool(words) and (known > HALF * len(words) or bracketed == len(words))
+    return bool(words) and (known > MAJORITY_SHARE * len(words) or bracketed == len(words))
 
 
 def _rows(

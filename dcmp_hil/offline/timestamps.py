@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     Column = NDArray[np.float64]
     Rows = NDArray[np.intp]
 
-_NEAR_END = 20.0  # usual steps: so close to its ends a counter is when it wraps
+_WRAP_DISTANCE_STEPS_MAX = 20.0  # usual steps: so close to its ends a counter is when it wraps
 _GAP_STEPS_MIN = 10.0  # usual steps; after a longer one the observer restarts anyway
-_COUNTERS = tuple(2.0**bits for bits in (8, 16, 24, 31, 32))
+_COUNTER_MODULI = tuple(2.0**bits for bits in (8, 16, 24, 31, 32))
 _TICKS = (1e-9, 1e-6, 1e-3)  # s: of a 32-bit counter that the file gives in another unit
-_CLOCKS = (60.0, 3600.0, 43_200.0, 86_400.0, 604_800.0)  # s: seconds of the minute ... of the week
+_CLOCK_MODULI_S = (60.0, 3600.0, 43_200.0, 86_400.0, 604_800.0)  # s: seconds of the minute ... of the week
 _FEW_ROWS_SHARE = 0.05  # share of rows
 _DAYS = ((2e4, 8e4), (7e5, 8e5))  # since 1900, since the year 0: from 1954 on
 _DAY_FRACTION_STEP_MAX = 1e-5  # of a day: 0.9 s
@@ -142,14 +142,14 @@ def _joined(parts: list[Column], begin: float) -> Column:
 
 def _unwrapped(raw: Column, size: float, usual: float, notes: list[str]) -> Column:
     """Continue a counter that starts again at its end."""
-    sizes = {modulus: f"2^{np.log2(modulus):.0f}" for modulus in _COUNTERS}
+    sizes = {modulus: f"2^{np.log2(modulus):.0f}" for modulus in _COUNTER_MODULI}
     sizes |= {2.0**32 * tick / size: "2^32" for tick in _TICKS}
-    sizes |= {clock / size: f"{clock:g} s" for clock in _CLOCKS}
+    sizes |= {clock / size: f"{clock:g} s" for clock in _CLOCK_MODULI_S}
     lift, found, counts = np.zeros(len(raw)), "", 0
     for k in (np.flatnonzero(np.diff(raw) < 0.0) + 1).tolist():
         before, after = float(raw[k - 1]), float(raw[k])
         for modulus, name in sizes.items():
-            near = min(_NEAR_END * usual, 0.3 * modulus)
+            near = min(_WRAP_DISTANCE_STEPS_MAX * usual, 0.3 * modulus)
             unsigned = before > modulus - near and 0.0 <= after < near
             signed = before > 0.5 * modulus - near and after < near - 0.5 * modulus
             step = after + modulus - before

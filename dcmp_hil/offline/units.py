@@ -13,7 +13,7 @@ Quantity = Literal["time", "position", "torque", "voltage", "velocity"]
 COUNTS = "counts"
 """The one position unit whose size is the encoder's own."""
 
-_DEG, _REV = math.pi / 180.0, 2.0 * math.pi
+_RAD_PER_DEG, _RAD_PER_REV = math.pi / 180.0, 2.0 * math.pi
 
 # The first spelling of each is the one that messages use; all are compared without case and punctuation.
 _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
@@ -28,12 +28,12 @@ _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
     "position": {
         1.0: ("rad", "rads", "radian", "radians"),
         1e-3: ("mrad", "milliradian", "milliradians"),
-        _DEG: ("deg", "degs", "degree", "degrees", "°", "grad"),
-        _DEG / 1e3: ("mdeg", "millideg", "millidegree", "millidegrees"),
-        _DEG / 60.0: ("arcmin", "arcminute", "arcminutes"),
-        _DEG / 3600.0: ("arcsec", "arcsecond", "arcseconds"),
+        _RAD_PER_DEG: ("deg", "degs", "degree", "degrees", "°", "grad"),
+        _RAD_PER_DEG / 1e3: ("mdeg", "millideg", "millidegree", "millidegrees"),
+        _RAD_PER_DEG / 60.0: ("arcmin", "arcminute", "arcminutes"),
+        _RAD_PER_DEG / 3600.0: ("arcsec", "arcsecond", "arcseconds"),
         math.pi / 200.0: ("gon",),
-        _REV: ("rev", "revs", "revolution", "revolutions", "turn", "turns", "umdrehungen"),
+        _RAD_PER_REV: ("rev", "revs", "revolution", "revolutions", "turn", "turns", "umdrehungen"),
         math.nan: (COUNTS, "count", "ticks", "tick", "cts", "lsb", "inc", "increments", "inkremente"),
     },
     "torque": {
@@ -47,9 +47,9 @@ _SPELLINGS: dict[Quantity, dict[float, tuple[str, ...]]] = {
     "velocity": {
         1.0: ("rad/s", "rad/sec", "rad per s", "rad per sec", "radps", "rad s-1", "rad s^-1"),
         1e-3: ("mrad/s", "mrad/sec", "mradps"),
-        _DEG: ("deg/s", "deg/sec", "deg per s", "degps", "dps", "°/s"),
-        _REV: ("rev/s", "rev/sec", "rev per s", "revps", "rps", "turns/s"),
-        _REV / 60.0: ("rpm", "rev/min", "r/min", "1/min", "u/min"),
+        _RAD_PER_DEG: ("deg/s", "deg/sec", "deg per s", "degps", "dps", "°/s"),
+        _RAD_PER_REV: ("rev/s", "rev/sec", "rev per s", "revps", "rps", "turns/s"),
+        _RAD_PER_REV / 60.0: ("rpm", "rev/min", "r/min", "1/min", "u/min"),
     },
 }
 SI: dict[Quantity, str] = {quantity: next(iter(sizes.values()))[0] for quantity, sizes in _SPELLINGS.items()}

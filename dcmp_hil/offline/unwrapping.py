@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-_TURN = 2.0 * np.pi
+_TURN_RAD = 2.0 * np.pi
 _BITS = (8, 10, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 32)
-_TURNS = (1.0, 2.0, 4.0)
-_HALF = 0.5
-_STEP_CHANGE_MAX_SHARE = 0.25
+_MODULUS_TURNS = (1.0, 2.0, 4.0)
+_HALF_SHARE = 0.5
+_STEP_CHANGE_SHARE_MAX = 0.25
 """Of the modulus: so much no step differs from the two before it once the wraps are undone."""
 _JUMP_MIN_RAD = 0.5  # rad between two rows, more than the rows around it move
 _ACCELERATION_MAX_RAD_S2 = 2e4  # rad/s2: above it there is no arm
 _NEIGHBOUR_ROWS = 3  # rows on either side that a step is compared with
-_LONGEST_SPIKE = 3  # rows
+_SPIKE_ROWS_MAX = 3  # rows
 _FEW_ROWS_SHARE = 0.02  # share of rows
 _ODD_ROWS_MIN = 3
 _STRETCH_ROWS_MIN = 3  # rows that have a step beside another one
@@ -64,8 +64,10 @@ def moduli(unit: str, size: float, counts_per_rev: float | None) -> dict[float, 
     counts_per_rev
         Of the encoder, where it is known: then a counter that was scaled to an angle is thought of, too.
     """
-    found = {turns * _TURN / size: "a turn" if turns == 1.0 else f"{turns:g} turns" for turns in _TURNS}
-    count = 1.0 if unit == COUNTS else None if counts_per_rev is None else _TURN / counts_per_rev / size
+    found = {
+        turns * _TURN_RAD / size: "a turn" if turns == 1.0 else f"{turns:g} turns" for turns in _MODULUS_TURNS
+    }
+    count = 1.0 if unit == COUNTS else None if counts_per_rev is None else _TURN_RAD / counts_per_rev / size
     if count is not None:
         found |= {2.0**bits * count: f"2^{bits} counts" for bits in _BITS}
     return dict(sorted(found.items()))
@@ -115,7 +117,7 @@ def continuous(
         )
     chosen = _found(raw, steps, inside, known) if modulus is None else modulus
     if isinstance(chosen, float):
-        wraps = np.where(np.abs(steps) > _HALF * chosen, -np.sign(steps), 0.0)
+        wraps = np.where(np.abs(steps) > _HALF_SHARE * chosen, -np.sign(steps), 0.0)
         places = int(np.count_nonzero(wraps[inside]))
         raw = raw + chosen * np.concatenate(([0.0], np.cumsum(wraps)))
         name = known.get(chosen, "")
@@ -148,11 +150,11 @@ def _found(raw: Column, steps: Column, inside: NDArray[np.bool_], known: dict[fl
     for modulus in known:
         if span > modulus * (1.0 + 1e-6):
             continue
-        wraps = np.where(np.abs(steps) > _HALF * modulus, -np.sign(steps), 0.0)
+        wraps = np.where(np.abs(steps) > _HALF_SHARE * modulus, -np.sign(steps), 0.0)
         if not wraps[inside].any():
             continue
         undone = steps + modulus * wraps
-        sharp = np.abs(np.diff(undone)) > _STEP_CHANGE_MAX_SHARE * modulus
+        sharp = np.abs(np.diff(undone)) > _STEP_CHANGE_SHARE_MAX * modulus
         near = wraps[1:].astype(bool) | wraps[:-1].astype(bool)
         # Where a wrap was undone the motion must go on as before: then it was one.
         if np.mean(sharp[near]) < 0.1:  # noqa: PLR2004 - a glitch may lie beside a wrap
@@ -161,7 +163,7 @@ def _found(raw: Column, steps: Column, inside: NDArray[np.bool_], known: dict[fl
 
 
 def _check_half(steps: Column, modulus: float) -> None:
-    sharp = np.abs(np.diff(steps)) > _HALF * modulus
+    sharp = np.abs(np.diff(steps)) > _HALF_SHARE * modulus
     if np.count_nonzero(sharp) > max(_ODD_ROWS_MIN, 0.001 * len(steps)):
         raise ConfigError(
             f"The position moves by about half of its modulus ({modulus:.6g}) between two rows in "
@@ -186,7 +188,7 @@ def _impossible(
     while places:
         first = places.pop(0)  # the step from row `first` to the next
         back = next(
-            (k for k in places if k - first <= _LONGEST_SPIKE and _returns(position, first, k, jump)), None
+            (k for k in places if k - first <= _SPIKE_ROWS_MAX and _returns(position, first, k, jump)), None
         )
         if back is not None:
             keep[first + 1 : back + 1] = False
@@ -217,7 +219,7 @@ def _check_few(raw: Column, jumps: Sequence[int], sizes: Column, open_: bool) ->
     if len(jumps) <= max(_ODD_ROWS_MIN, _FEW_ROWS_SHARE * len(raw) / 10.0):
         return
     usual = float(np.median(np.abs(sizes)))
-    alike = np.mean(np.abs(np.abs(sizes) - usual) < 0.2 * usual) > _HALF
+    alike = np.mean(np.abs(np.abs(sizes) - usual) < 0.2 * usual) > _HALF_SHARE
     hint = (
         f"The jumps are of about {usual:.4g}: if it wraps, say --modulus N in the unit of the column "
         f"(it spans {np.ptp(raw):.6g})."

@@ -16,7 +16,7 @@ _FILTER_ORDER = 3
 _FREQUENCY_MAX_PER_SAMPLE = 0.45
 """Cycles per sample: below 0.5 by more than the steps of a grid differ from the period."""
 _PADDING_PERIODS = 2.0  # periods of the corner: what the slowest pole leaves after them is 0.2 %
-_LEAST_PADDING = 4 * _FILTER_ORDER  # samples, what scipy takes
+_PADDING_SAMPLES_MIN = 4 * _FILTER_ORDER  # samples, what scipy takes
 
 
 class ZeroPhase(NamedTuple):
@@ -85,9 +85,9 @@ def zero_phase(
         # Around a row, u is the mean of the steps on either side of it.
         around = 0.5 * (applied[rows] + np.append(applied[first + 1 : last], applied[last - 1]))
         grid = _even(time[rows], period)
-        if len(grid) <= _LEAST_PADDING:
+        if len(grid) <= _PADDING_SAMPLES_MIN:
             continue
-        pad = min(len(grid) - 1, max(_LEAST_PADDING, round(_PADDING_PERIODS / (cutoff * period))))
+        pad = min(len(grid) - 1, max(_PADDING_SAMPLES_MIN, round(_PADDING_PERIODS / (cutoff * period))))
         smooth, u = (
             _both_ways(np.interp(grid, time[rows], values), cutoff * (grid[1] - grid[0]), pad)
             for values in (position[rows], around)

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.panel.request_head import Head
 
-WAITING, SERVED = 256, 64
+WAITING_MAX, SERVED_MAX = 256, 64
 """Connections without a whole request, and with one."""
-BACKLOG = 64
+BACKLOG_MAX = 64
 """Connections that are taken from the kernel at once: fewer than may wait, so that each can speak."""
 _REQUEST_TIMEOUT_S = 2.0  # s for a whole request
 _REFUSAL_TIMEOUT_S = 0.5  # s for a refused client to take its answer
@@ -81,7 +81,7 @@ class ConnectionLimiter:
 
     def admit(self, visit: Visit) -> None:
         """Admit a new connection; close the oldest one without a request if there are too many."""
-        if len(self._waiting) >= WAITING:
+        if len(self._waiting) >= WAITING_MAX:
             next(iter(self._waiting)).drop()
         self._waiting[visit] = None
 
@@ -92,7 +92,7 @@ class ConnectionLimiter:
             visit.is_stop = True
         elif not (self._friends if known else self._strangers).take():
             return HTTPStatus.TOO_MANY_REQUESTS
-        if len(self._served) >= SERVED:
+        if len(self._served) >= SERVED_MAX:
             oldest = next((one for one in self._served if not one.is_stop), None)
             if oldest is None:
                 return HTTPStatus.SERVICE_UNAVAILABLE

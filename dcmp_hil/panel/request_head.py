@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-HEAD_BYTES = 1 << 13
+HEAD_BYTES_MAX = 1 << 13
 """Bytes of request line and header fields."""
-BODY_BYTES = 1 << 14
+BODY_BYTES_MAX = 1 << 14
 """Bytes of a body."""
 _HEADERS_MAX = 64
 _TARGET_CHARS_MAX = 2048  # characters
@@ -17,7 +17,12 @@ _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*(.*?)[ \t]*")
 _LINE = re.compile(rb"([A-Z]{1,20}) (/[\x21-\x7e]*) HTTP/1\.[01]")
 _METHODS = {b"GET", b"HEAD", b"POST"}
 _UNIQUE_HEADERS = {b"host", b"content-length", b"origin", b"cookie", b"content-type"}
-_REFUSED = {b"transfer-encoding": 411, b"content-encoding": 415, b"expect": 417, b"upgrade": 400}
+_REFUSED_HEADER_STATUS = {
+    b"transfer-encoding": 411,
+    b"content-encoding": 415,
+    b"expect": 417,
+    b"upgrade": 400,
+}
 _OF_CONNECTION = {b"connection", b"keep-alive", b"proxy-connection", b"te", b"trailer"}
 
 
@@ -61,7 +66,7 @@ def head_of(data: bytes) -> Head | None:
     """
     end = data.find(_END)
     head = data[: end + 2] if end >= 0 else data
-    if len(head) > HEAD_BYTES:
+    if len(head) > HEAD_BYTES_MAX:
         raise RequestError(431)
     if _FORBIDDEN_BYTES.search(head):
         raise RequestError
@@ -96,8 +101,8 @@ def _fields(lines: list[bytes]) -> tuple[tuple[bytes, bytes], ...]:
         fields.append((found[1], found[2]))
     names = [name.lower() for name, _ in fields]
     for name in names:
-        if name in _REFUSED:
-            raise RequestError(_REFUSED[name])
+        if name in _REFUSED_HEADER_STATUS:
+            raise RequestError(_REFUSED_HEADER_STATUS[name])
         if name in _UNIQUE_HEADERS and names.count(name) > 1:
             raise RequestError
     if b"host" not in names:
@@ -109,7 +114,7 @@ def _length(method: bytes, fields: tuple[tuple[bytes, bytes], ...]) -> int:
     given = next((value for name, value in fields if name.lower() == b"content-length"), b"0")
     if not given.isdigit():
         raise RequestError
-    if len(given) > len(str(BODY_BYTES)) or int(given) > BODY_BYTES:
+    if len(given) > len(str(BODY_BYTES_MAX)) or int(given) > BODY_BYTES_MAX:
         raise RequestError(413)
     length = int(given)
     if length and method != b"POST":

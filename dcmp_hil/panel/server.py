@@ -19,9 +19,9 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
 from dcmp_hil.live.stop_command import End
 from dcmp_hil.panel.access_control import AccessControl
-from dcmp_hil.panel.admission import BACKLOG, ConnectionLimiter, Visit
+from dcmp_hil.panel.admission import BACKLOG_MAX, ConnectionLimiter, Visit
 from dcmp_hil.panel.log_filter import quiet
-from dcmp_hil.panel.request_head import BODY_BYTES
+from dcmp_hil.panel.request_head import BODY_BYTES_MAX
 from dcmp_hil.panel.run_follower import Watcher
 from dcmp_hil.platform.clock import MonotonicClock
 
@@ -66,7 +66,7 @@ class Panel:
         async def check(request: web.Request, handler: Any) -> web.StreamResponse:
             return await self.access.check(request, handler)
 
-        app = web.Application(middlewares=[check], client_max_size=BODY_BYTES)
+        app = web.Application(middlewares=[check], client_max_size=BODY_BYTES_MAX)
         app.on_response_prepare.append(self.access.add_headers)
         app.cleanup_ctx.append(self._watching)
         app.on_shutdown.append(self._end)
@@ -91,7 +91,7 @@ class Panel:
         server = None
         with quiet(loop):
             try:
-                server = await loop.create_server(limiter, "127.0.0.1", self._port, backlog=BACKLOG)
+                server = await loop.create_server(limiter, "127.0.0.1", self._port, backlog=BACKLOG_MAX)
                 for listening in server.sockets:
                     _keep_more_waiting(listening)
                 ready(self.access.address)

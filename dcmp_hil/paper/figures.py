@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     Table = dict[str, NDArray[np.float64]]
 
-_SPLIT = 1.0  # s: left of it the transient, right of it what the paper judges
-_MARGIN = 0.02  # s, left of t = 0, so that what happens there is not hidden by the axis
-_DPI = 200
+_TRANSIENT_END_S = 1.0  # s: left of it the transient, right of it what the paper judges
+_LEFT_MARGIN_S = 0.02  # s, left of t = 0, so that what happens there is not hidden by the axis
+_DOTS_PER_INCH = 200
 _INK, _GRID = "#30363d", "#d9dee3"
 _STYLE: dict[Any, Any] = {  # matplotlib's type of its keys changes from release to release
     "font.size": 9.0,
@@ -77,7 +77,9 @@ def draw(reproduction: Reproduction, folder: Path) -> list[Path]:
         written = []
         with mpl.rc_context(_STYLE):
             for name, (title, panels) in FIGURES.items():
-                figure = Figure(figsize=(7.2, 0.5 + 1.9 * len(panels)), dpi=_DPI, layout="constrained")
+                figure = Figure(
+                    figsize=(7.2, 0.5 + 1.9 * len(panels)), dpi=_DOTS_PER_INCH, layout="constrained"
+                )
                 FigureCanvasAgg(figure)
                 _lay_out(figure, title, panels, table)
                 written.append(_save(figure, folder / name))
@@ -90,10 +92,10 @@ def _lay_out(figure: Figure, title: str, panels: tuple[FigurePanel, ...], table:
     for panel, (left, right) in zip(panels, grid, strict=True):
         _draw_panel(left, right, panel, table)
     left, right = grid[-1]
-    left.set_xlim(-_MARGIN, _SPLIT)
+    left.set_xlim(-_LEFT_MARGIN_S, _TRANSIENT_END_S)
     left.set_xticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     left.set_xlabel("time, s (the first second)")
-    right.set_xlim(_SPLIT, float(table["t"][-1]))
+    right.set_xlim(_TRANSIENT_END_S, float(table["t"][-1]))
     right.set_xticks([1, 5, 10, 15, 20])
     right.set_xlabel("time, s (from then on)")
     figure.align_ylabels(grid[:, 0])
@@ -101,7 +103,7 @@ def _lay_out(figure: Figure, title: str, panels: tuple[FigurePanel, ...], table:
 
 
 def _draw_panel(left: Axes, right: Axes, panel: FigurePanel, table: Table) -> None:
-    early = table["t"] <= _SPLIT
+    early = table["t"] <= _TRANSIENT_END_S
     _draw_lines(left, panel, table, early)
     _draw_lines(right, panel, table, ~early, panel.late_scale)
     left.set_ylabel(panel.label)

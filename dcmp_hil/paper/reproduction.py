@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.result import Result
 
-WINDOW_FROM = 1.0  # s: the paper judges its curves "after one second elapsed"
+WINDOW_START_S = 1.0  # s: the paper judges its curves "after one second elapsed"
 
 _PRINTED = "dcmp_hil.paper.printed"
 VARIANTS = {
@@ -68,7 +68,7 @@ def reproduce() -> Reproduction:
 
 
 def _run(overrides: Sequence[str]) -> Result:
-    session = Session(load_rig("paper", overrides), fast=True, window_from=WINDOW_FROM)
+    session = Session(load_rig("paper", overrides), fast=True, window_from=WINDOW_START_S)
     session.run()
     if session.stop.requested:
         raise KeyboardInterrupt

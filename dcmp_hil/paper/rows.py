@@ -95,7 +95,7 @@ class Misprint:
         return self.low <= self.as_printed <= self.high
 
 
-EXPECTED = (
+EXPECTED_ROWS = (
     Expected("voltage_at_start_V", None, 1174.9, 1175.1),
     Expected("tracking_max_rad", 1e-4, 0.0, 3e-5),
     Expected("tracking_rms_rad", None, 3.15e-6, 3.85e-6),
@@ -111,7 +111,7 @@ _EQ10 = ("(10)", "1/ku [..]", "[..]", "eq10")
 _EQ8 = ("(8)", "v1' twice", "n1, and v1' = n1", "eq8")
 _BOUND = ("III.A", "M > |w|: 17", "M > |e'''|: 1000", "M17")
 
-PRINTED = (
+PRINTED_ROWS = (
     Printed(*_EQ9, "disturbance_error_rms_rad_s2", 3.42, 3.78),
     Printed(*_EQ9, "tracking_max_rad", 1.25e-3, 1.53e-3),
     Printed(*_EQ10, "tracking_max_rad", 1.435e-2, 1.585e-2),
@@ -133,12 +133,12 @@ def rows(corrected: Measures, eq9: Measures, eq10: Measures) -> tuple[Row, ...]:
             low=expected.low,
             high=expected.high,
         )
-        for expected in EXPECTED
+        for expected in EXPECTED_ROWS
     )
 
 
 def misprints(corrected: Measures, variants: dict[str, Measures]) -> tuple[Misprint, ...]:
-    """Return the table of the runs of `PRINTED`, by variant, beside the corrected run."""
+    """Return the table of the runs of `PRINTED_ROWS`, by variant, beside the corrected run."""
     return tuple(
         Misprint(
             equation=one.equation,
@@ -150,7 +150,7 @@ def misprints(corrected: Measures, variants: dict[str, Measures]) -> tuple[Mispr
             low=one.low,
             high=one.high,
         )
-        for one in PRINTED
+        for one in PRINTED_ROWS
     )
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-_FOR_DATA = 256e6  # bytes: half an hour of run.mcap at 1 kHz
-_PART_FOR_DATA = 0.25  # of a small disk
+_DATA_RESERVE_BYTES_MAX = 256e6  # bytes: half an hour of run.mcap at 1 kHz
+_DATA_RESERVE_SHARE = 0.25  # of a small disk
 
 
 def room_for(file: Path) -> float:
@@ -31,7 +31,7 @@ def room_for(file: Path) -> float:
 def kept_for_data(file: Path) -> float:
     """Return the bytes of a disk that a picture of a run leaves to its data: 256 MB, a quarter at most."""
     try:
-        return min(_FOR_DATA, _PART_FOR_DATA * shutil.disk_usage(file.parent).total)
+        return min(_DATA_RESERVE_BYTES_MAX, _DATA_RESERVE_SHARE * shutil.disk_usage(file.parent).total)
     except OSError:
         return 0.0
 

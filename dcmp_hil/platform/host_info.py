@@ -10,7 +10,7 @@ from typing import Any
 
 from dcmp_hil.errors import ConfigError
 
-_CAN_NICE, _CAN_LOCK = 23, 14  # bits of CAP_SYS_NICE and CAP_IPC_LOCK in linux/capability.h
+_CAP_SYS_NICE_BIT, _CAP_IPC_LOCK_BIT = 23, 14  # bits of CAP_SYS_NICE and CAP_IPC_LOCK in linux/capability.h
 _FLAVOURS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the longer names first
 _GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
 _MODEL = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
@@ -103,8 +103,8 @@ def privileges() -> dict[str, Any]:
     locked, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     return {
         "uid": os.geteuid(),
-        "cap_sys_nice": bool(held >> _CAN_NICE & 1),
-        "cap_ipc_lock": bool(held >> _CAN_LOCK & 1),
+        "cap_sys_nice": bool(held >> _CAP_SYS_NICE_BIT & 1),
+        "cap_ipc_lock": bool(held >> _CAP_IPC_LOCK_BIT & 1),
         "rtprio_limit": resource.getrlimit(resource.RLIMIT_RTPRIO)[0],
         "memlock_limit": "unlimited" if locked == resource.RLIM_INFINITY else locked,
     }

@@ -9,7 +9,7 @@ from pathlib import Path
 _TABLE = Path("/proc/net/tcp")
 _CONNECTED_STATES = {"01", "04", "05", "08"}  # established, and on the way out with what was read
 _PERSON_USER_IDS = range(1000, 60_000)  # user numbers, as distributions give them
-_ROOT = 0  # may do as it likes, and reads this process's memory
+_ROOT_USER_ID = 0  # may do as it likes, and reads this process's memory
 
 
 def strangers(port: int) -> list[int]:
@@ -20,7 +20,7 @@ def strangers(port: int) -> list[int]:
     except OSError:  # not Linux: it cannot be found out
         return []
     users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED_STATES}
-    return sorted(users - {os.getuid(), _ROOT})
+    return sorted(users - {os.getuid(), _ROOT_USER_ID})
 
 
 def others_here() -> bool:

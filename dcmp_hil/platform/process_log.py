@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FILE = "process.log"
 """Its name in a run's folder."""
-STDERR = 2
+STDERR_FILENO = 2
 """The descriptor that libraries write to."""
 _terminal: int | None = None
 
@@ -35,7 +35,9 @@ def terminal() -> int | None:
 
 def for_programs() -> int:
     """Return where a program that is started writes its log lines to, as `subprocess` takes it."""
-    return subprocess.DEVNULL if _terminal is None and descriptor_of_stderr() == STDERR else STDERR
+    return (
+        subprocess.DEVNULL if _terminal is None and descriptor_of_stderr() == STDERR_FILENO else STDERR_FILENO
+    )
 
 
 @contextmanager
@@ -54,6 +56,6 @@ def terminal_copy() -> Iterator[int]:
 def descriptor_of_stderr() -> int:
     """Return the descriptor that `sys.stderr` writes to; 2 where it has none, as in a notebook."""
     try:
-        return STDERR if sys.stderr is None else sys.stderr.fileno()
+        return STDERR_FILENO if sys.stderr is None else sys.stderr.fileno()
     except (OSError, ValueError):
-        return STDERR
+        return STDERR_FILENO

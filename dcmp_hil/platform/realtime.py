@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 _HELPER_PRIORITY = 1  # the lowest real-time priority
 _RUN_WITHOUT_SLEEP_MAX_US = 80_000
 """Microseconds that a real-time thread may run without a sleep; a helper may wake it every 100 ms."""
-_CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall
-_TIMER_SLACK = 29  # prctl: PR_SET_TIMERSLACK
-_USUAL_SLACK = 0  # ns; 0 means: as the process began
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall
+_PR_SET_TIMERSLACK = 29  # prctl: PR_SET_TIMERSLACK
+_USUAL_SLACK_NS = 0  # ns; 0 means: as the process began
 
 _LIMITS = (
     "put a line `YOU - {limit}`, YOU being your user name, into /etc/security/limits.conf and log in again"
@@ -211,8 +211,8 @@ def _switch_sooner(timing: RealtimeSettings, undo: ExitStack) -> None:
 
 def _sharpen_timer(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: ARG001
     """Set the timer slack so that a normal thread wakes on time, not 50 us later, as with SCHED_FIFO."""
-    _call_libc("prctl", _TIMER_SLACK, 1, 0, 0, 0)
-    undo.callback(_call_libc, "prctl", _TIMER_SLACK, _USUAL_SLACK, 0, 0, 0)
+    _call_libc("prctl", _PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    undo.callback(_call_libc, "prctl", _PR_SET_TIMERSLACK, _USUAL_SLACK_NS, 0, 0, 0)
 
 
 def _lock_memory(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: ARG001
@@ -220,7 +220,7 @@ def _lock_memory(timing: RealtimeSettings, undo: ExitStack) -> None:  # noqa: AR
     held = privileges()
     for_ever = held["cap_ipc_lock"] or held["memlock_limit"] == "unlimited"
     # Under a limit, locking what is still to come would turn the limit into a failing malloc later.
-    _call_libc("mlockall", _CURRENT | _ON_FAULT | (_FUTURE if for_ever else 0))
+    _call_libc("mlockall", _MCL_CURRENT | _MCL_ONFAULT | (_MCL_FUTURE if for_ever else 0))
     undo.callback(_call_libc, "munlockall")
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What ends a run."""
-TAKEN = 0x80
+TAKEN_FLAG = 0x80
 """Added to the number of a signal where Python has handled it, and not only the kernel delivered it."""
 _STOP = "STOP"
 
@@ -139,7 +139,7 @@ class StopRequest:
             raise Interrupted
         if self._woken != -1:
             with suppress(OSError):
-                os.write(self._woken, bytes([number | TAKEN]))
+                os.write(self._woken, bytes([number | TAKEN_FLAG]))
         self.ask(number)
 
     def _leave_alone(self, number: int, handler: Any) -> Any:

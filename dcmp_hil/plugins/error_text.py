@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_FOLDER = str(Path(__file__).parent)
 _SHOWN_CHARS_MAX = 300  # characters of a message
-_LONGEST_VALUE = 60
+_SHOWN_VALUE_CHARS_MAX = 60
 REMEDY = "Correct it there."
 
 
@@ -30,7 +30,7 @@ def message_of(error: BaseException) -> str:
 def syntax_of(error: SyntaxError) -> str:
     """Return file, line and message of a syntax error."""
     line = f", line {error.lineno}" if error.lineno else ""
-    text = f": {error.text.strip()[:_LONGEST_VALUE]}" if error.text and error.text.strip() else ""
+    text = f": {error.text.strip()[:_SHOWN_VALUE_CHARS_MAX]}" if error.text and error.text.strip() else ""
     return f"{shown_path(error.filename or 'source')}{line}: {error.msg}{text}"
 
 
@@ -75,7 +75,7 @@ def shown_value(value: object) -> str:
         text = " ".join(repr(value).split())
     except Exception:  # noqa: BLE001 - a __repr__ of the user's own, or an int of more than 4300 digits
         return f"a value of type {type(value).__name__}"
-    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
+    return text if len(text) <= _SHOWN_VALUE_CHARS_MAX else f"{text[:_SHOWN_VALUE_CHARS_MAX]} ..."
 
 
 def shown_path(path: str) -> str:

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _PACKED = struct.Struct("<5Q4q")
-_COLUMNS = _PACKED.size // 8
+_COLUMN_COUNT = _PACKED.size // 8
 _FIRST_TIME, _LAST_TIME, _START, _LENGTH, _INDEXED, _COMPRESSED = range(6)
-_OFFSETS = slice(7, 9)  # of the index of each channel, from the beginning of the chunk
-_BLOCK = 512  # chunks: 15 s at 1 kHz
-_ABSENT = 0
+_OFFSET_COLUMNS = slice(7, 9)  # of the index of each channel, from the beginning of the chunk
+_BLOCK_CHUNKS = 512  # chunks: 15 s at 1 kHz
+_ABSENT_OFFSET = 0
 
 
 class ChunkIndices:
@@ -55,13 +55,13 @@ class ChunkIndices:
             index.uncompressed_size,
             *(index.message_index_offsets.get(channel, start) - start for channel in self._channels),
         )
-        if len(self._newest) == _BLOCK * _PACKED.size:
+        if len(self._newest) == _BLOCK_CHUNKS * _PACKED.size:
             self._blocks.append(_pressed(self._newest))
             self._newest.clear()
 
     def __len__(self) -> int:
         """Count the chunks."""
-        return len(self._blocks) * _BLOCK + len(self._newest) // _PACKED.size
+        return len(self._blocks) * _BLOCK_CHUNKS + len(self._newest) // _PACKED.size
 
     def __iter__(self) -> Iterator[ChunkIndex]:
         """Yield the index of each chunk."""
@@ -88,7 +88,7 @@ class ChunkIndices:
                 message_index_offsets={
                     channel: start + offset
                     for channel, offset in zip(self._channels, offsets, strict=True)
-                    if offset != _ABSENT
+                    if offset != _ABSENT_OFFSET
                 },
                 message_start_time=first,
                 uncompressed_size=uncompressed,
@@ -97,8 +97,8 @@ class ChunkIndices:
 
 def _pressed(packed: bytearray) -> bytes:
     """Compress a block; in integers that wrap around, so that every number comes back, likely or not."""
-    rows = np.frombuffer(bytes(packed), np.int64).reshape(-1, _COLUMNS).copy()
-    rows[:, _OFFSETS] -= rows[:, [_LENGTH]]
+    rows = np.frombuffer(bytes(packed), np.int64).reshape(-1, _COLUMN_COUNT).copy()
+    rows[:, _OFFSET_COLUMNS] -= rows[:, [_LENGTH]]
     rows[:, _LENGTH] -= rows[:, _COMPRESSED]
     rows[:, _LAST_TIME] -= rows[:, _FIRST_TIME]
     rows[1:, _FIRST_TIME] = np.diff(rows[:, _FIRST_TIME])
@@ -109,7 +109,7 @@ def _pressed(packed: bytearray) -> bytes:
 
 def _unpressed(block: bytes) -> bytes:
     """Return a block as it was packed."""
-    columns: NDArray[np.int64] = np.frombuffer(zlib.decompress(block), np.int64).reshape(_COLUMNS, -1)
+    columns: NDArray[np.int64] = np.frombuffer(zlib.decompress(block), np.int64).reshape(_COLUMN_COUNT, -1)
     rows = columns.T.copy()
     size = rows[:, _LENGTH] + rows[:, _COMPRESSED] + rows[:, _INDEXED]
     rows[1:, _START] += size[:-1]
@@ -117,5 +117,5 @@ def _unpressed(block: bytes) -> bytes:
     rows[:, _FIRST_TIME] = np.cumsum(rows[:, _FIRST_TIME])
     rows[:, _LAST_TIME] += rows[:, _FIRST_TIME]
     rows[:, _LENGTH] += rows[:, _COMPRESSED]
-    rows[:, _OFFSETS] += rows[:, [_LENGTH]]
+    rows[:, _OFFSET_COLUMNS] += rows[:, [_LENGTH]]
     return rows.tobytes()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _FOOTER = struct.Struct("<BQQQI")
-_DATA_END = HEAD.size + 4  # bytes
+_DATA_END_BYTES = HEAD.size + 4  # bytes
 _ATTACHMENT_BYTES_MAX = 1 << 16  # bytes of the attachment at the end
 
 
@@ -46,7 +46,7 @@ def ending_of(path: Path) -> Ending | None:
             opcode, _, summary, _, _ = _FOOTER.unpack_from(tail, footer_at)
             if opcode != Op.FOOTER:
                 return None
-            end = (summary or size - len(tail) + footer_at) - _DATA_END
+            end = (summary or size - len(tail) + footer_at) - _DATA_END_BYTES
             file.seek(max(0, end - _ATTACHMENT_BYTES_MAX))
             return _ending_in(file.read(min(end, _ATTACHMENT_BYTES_MAX)))
     except (OSError, ValueError, RecordError):

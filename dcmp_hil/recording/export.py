@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.recording.reexecute import Reexecution
 
-_ROW_GROUP = 1 << 16  # rows of a row group
+_ROW_GROUP_ROWS = 1 << 16  # rows of a row group
 _REPLAYED_COLUMNS = (  # what a replay says a second time
     "position_estimate_rad",
     "velocity_estimate_rad_s",
@@ -52,7 +52,7 @@ def to_parquet(run: RecordedRun, path: Path) -> None:
         place.open("wb") as file,  # given a path, pyarrow removes it where it cannot write
         parquet.ParquetWriter(file, schema) as writer,
     ):
-        for block in run.blocks(_ROW_GROUP):
+        for block in run.blocks(_ROW_GROUP_ROWS):
             writer.write_table(pyarrow.table(columns(block), schema=schema))
 
 

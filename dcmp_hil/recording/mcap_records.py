@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 """Opcode and length, in front of every record."""
-LARGEST_CHUNK = 16 << 20
+CHUNK_BYTES_MAX = 16 << 20
 """Bytes of a block, unpacked; this program writes some kB, `mcap recover` writes 4 MiB."""
-_LARGEST_TEXT = 1 << 20  # bytes of an attachment or a metadata record
+_TEXT_BYTES_MAX = 1 << 20  # bytes of an attachment or a metadata record
 _RECORD_BYTES_MAX = 64 << 20  # bytes of any other record
-_WINDOW = 1 << 23  # bytes that zstd may look back: what level 19 asks for
+_ZSTD_WINDOW_BYTES_MAX = 1 << 23  # bytes that zstd may look back: what level 19 asks for
 _CHUNK = struct.Struct("<QQQII")
 _ATTACHMENT = struct.Struct("<QQI")
 _FOOTER = struct.Struct("<QQI")
@@ -47,7 +47,7 @@ class Op(IntEnum):
     DATA_END = 0x0F
 
 
-KNOWN = range(Op.HEADER, Op.DATA_END + 1)
+KNOWN_OPCODES = range(Op.HEADER, Op.DATA_END + 1)
 
 
 class RecordError(Exception):
@@ -65,7 +65,7 @@ class Attachment(NamedTuple):
 def length_allowed(opcode: int, length: int) -> bool:
     """Return whether a record of this kind may be so long (bytes)."""
     if opcode in {Op.ATTACHMENT, Op.METADATA, Op.SCHEMA, Op.CHANNEL, Op.HEADER}:
-        return length <= _LARGEST_TEXT
+        return length <= _TEXT_BYTES_MAX
     return length <= _RECORD_BYTES_MAX
 
 
@@ -80,7 +80,7 @@ def size_of_chunk(content: bytes) -> int:
     if len(content) < _CHUNK.size:
         raise RecordError("it is too short")
     size: int = _CHUNK.unpack_from(content)[2]
-    if size > LARGEST_CHUNK:
+    if size > CHUNK_BYTES_MAX:
         raise RecordError(f"it would unpack to {size / 2**20:.4g} MiB")
     return size
 
@@ -251,7 +251,7 @@ def _text(content: bytes, at: int) -> tuple[str, int]:
 def _unpack_zstd(packed: bytes, size: int) -> bytes:
     """Unpack one frame, to `size` bytes at most, for any size that the frame itself states."""
     said = zstandard.get_frame_parameters(packed)
-    if said.window_size > _WINDOW:
+    if said.window_size > _ZSTD_WINDOW_BYTES_MAX:
         raise ValueError("it asks for too much memory")
     if said.content_size not in {size, zstandard.CONTENTSIZE_UNKNOWN}:
         raise ValueError("it says two sizes")

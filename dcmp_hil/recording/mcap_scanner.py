@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.recording.mcap_records import (
     HEAD,
-    KNOWN,
+    KNOWN_OPCODES,
     MAGIC,
     Attachment,
     Op,
@@ -150,7 +150,7 @@ class Scanner:
         if len(head) < HEAD.size:
             raise RecordError("the file was cut off")
         opcode, length = HEAD.unpack(head)
-        if opcode not in KNOWN:
+        if opcode not in KNOWN_OPCODES:
             raise RecordError("there is no record")
         if not length_allowed(opcode, length):
             raise RecordError("a record says that it is longer than any is")

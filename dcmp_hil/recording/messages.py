@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.recording.mcap_records import HEAD, KNOWN, Op, RecordError, channel_in, schema_in
+from dcmp_hil.recording.mcap_records import HEAD, KNOWN_OPCODES, Op, RecordError, channel_in, schema_in
 from dcmp_hil.recording.schema import CYCLE_SCHEMA, CYCLES, EVENTS
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 _MESSAGE = struct.Struct("<HIQQ")
-_CDR = 4  # bytes in front of the numbers
+_CDR_HEADER_BYTES = 4  # bytes in front of the numbers
 _PERIOD = np.dtype(
     [
         ("opcode", "u1"),
@@ -30,11 +30,11 @@ _PERIOD = np.dtype(
     ]
 )
 _PERIOD_LENGTH = _PERIOD.itemsize - HEAD.size
-_HEADER = 0x00000100  # of CDR, little endian, as a number
-LONGEST_S = 1e9
+_CDR_HEADER = 0x00000100  # of CDR, little endian, as a number
+RUN_TIME_MAX_S = 1e9
 """s; a device time beyond it has the beginning's time in the log."""
-_MOST_EVENTS = 200_000
-_LONGEST_EVENT = 100_000  # bytes
+_EVENTS_MAX = 200_000
+_EVENT_BYTES_MAX = 100_000  # bytes
 
 
 class Messages:
@@ -86,7 +86,7 @@ class Messages:
                 return
             opcode, length = HEAD.unpack_from(data, at)
             start = at + HEAD.size
-            if length > end - start or opcode not in KNOWN:
+            if length > end - start or opcode not in KNOWN_OPCODES:
                 self._fault("a block ends inside a record")
                 return
             if opcode == Op.MESSAGE and length == _PERIOD_LENGTH and (count := self._periods(data, at)):
@@ -105,7 +105,7 @@ class Messages:
             (found["opcode"] == Op.MESSAGE)
             & (found["length"] == _PERIOD_LENGTH)
             & (found["channel"] == self.channel_of(CYCLES))
-            & (found["header"] == _HEADER)
+            & (found["header"] == _CDR_HEADER)
         )
         count = len(found) if same.all() else int(np.argmin(same))
         found = found[:count]
@@ -154,10 +154,10 @@ class Messages:
             }
 
     def _event(self, sequence: int, log_time: int, text: bytes) -> None:
-        if len(self.events) >= _MOST_EVENTS:
-            self._fault(f"it has more than {_MOST_EVENTS} events")
+        if len(self.events) >= _EVENTS_MAX:
+            self._fault(f"it has more than {_EVENTS_MAX} events")
             return
-        if len(text) > _LONGEST_EVENT:
+        if len(text) > _EVENT_BYTES_MAX:
             self._fault("an event is longer than any is")
         else:
             self.events.append((sequence, log_time, text))
@@ -169,6 +169,6 @@ class Messages:
 def log_times(times: NDArray[np.float64], began_ns: int) -> NDArray[np.uint64]:
     """Return the times of the log that belong to device times (s), ns since 1970, shape (n,)."""
     with np.errstate(invalid="ignore"):
-        known = np.abs(times) < LONGEST_S
+        known = np.abs(times) < RUN_TIME_MAX_S
     offset = np.rint(np.where(known, times, 0.0) * 1e9).astype(np.int64)
     return (offset + began_ns).astype(np.uint64)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
-_GIT_S = 2.0
+_GIT_TIMEOUT_S = 2.0
 
 
 def about(rig: Rig, note: str = "", faults: Sequence[str] = (), folder: Path | None = None) -> dict[str, str]:
@@ -67,6 +67,6 @@ def git_state(folder: Path) -> str:
 
 def _ask(git: str, folder: Path, *words: str) -> str:
     done = subprocess.run(  # noqa: S603 - git, with words of our own
-        [git, "-C", str(folder), *words], capture_output=True, text=True, timeout=_GIT_S, check=True
+        [git, "-C", str(folder), *words], capture_output=True, text=True, timeout=_GIT_TIMEOUT_S, check=True
     )
     return done.stdout.strip()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.mcap_scanner import Record
     from dcmp_hil.values import Event
 
-_MOST_TOLD = 20  # sentences
+_SENTENCES_MAX = 20  # sentences
 _TEXT_CHARS_MAX = 10_000  # characters of what is said of a run
 _UNCHECKED_NOTE = (
     "it has the older layout: what it says of its run (version, note, faults) is under no checksum, and "
@@ -164,8 +164,8 @@ def _told(found: _Found, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[
             told.append("the checksum of its index is wrong")
         if not scanner.closed:
             told.append("it was cut off")
-    more = len(told) - _MOST_TOLD
-    return (*told[:_MOST_TOLD], f"and {more} more of the kind") if more > 0 else tuple(told)
+    more = len(told) - _SENTENCES_MAX
+    return (*told[:_SENTENCES_MAX], f"and {more} more of the kind") if more > 0 else tuple(told)
 
 
 def _rig(path: Path, found: _Found, run: dict[str, str]) -> Rig:

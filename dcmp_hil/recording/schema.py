@@ -33,7 +33,7 @@ _UNITS = {
 _HEADER = b"\0\1\0\0"  # of CDR: little endian
 _LEVELS: dict[Level, int] = {"DEBUG": 1, "INFO": 2, "WARN": 3, "ERROR": 4}  # of foxglove.Log
 _FROM_LEVELS = {number: level for level, number in _LEVELS.items()}
-_LONGEST_TEXT = 10_000  # characters
+_TEXT_CHARS_MAX = 10_000  # characters
 _ADAPTERS = {kind: TypeAdapter(data) for kind, data in DATA.items()}
 
 
@@ -82,7 +82,7 @@ def event_to_bytes(event: Event, at_ns: int) -> bytes:
     document: dict[str, Any] = {
         "timestamp": {"sec": at_ns // 10**9, "nsec": at_ns % 10**9},
         "level": _LEVELS[event.level],
-        "message": event.text[:_LONGEST_TEXT],
+        "message": event.text[:_TEXT_CHARS_MAX],
         "name": event.kind.value,
         "data": event.data._asdict() if event.data else None,
         "t": event.t,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Reference
 
 _T, _FAULT = FIELDS.index("t"), FIELDS.index("fault")
-_FAULT_CODES = 256  # codes
+_FAULT_CODES_MAX = 256  # codes
 
 
 def named_in(rig: Rig) -> dict[str, str]:
@@ -67,13 +67,13 @@ def check_numbers(recorded: RecordedRun) -> None:
     """
     times, faults = recorded.rows[:, _T], recorded.rows[:, _FAULT]
     with np.errstate(invalid="ignore"):
-        wrong = ~(np.isfinite(times) & (faults >= 0) & (faults < _FAULT_CODES))
+        wrong = ~(np.isfinite(times) & (faults >= 0) & (faults < _FAULT_CODES_MAX))
         wrong[1:] |= ~(np.diff(times) > 0.0)
     if wrong.any():
         k = int(np.argmax(wrong))
         raise ConfigError(
             f"{recorded.path}: period {k + 1} has t = {times[k]:g} s and fault = {faults[k]:g}; time must "
-            f"rise, and a fault is a code below {_FAULT_CODES}. No run of dcmp-hil wrote that."
+            f"rise, and a fault is a code below {_FAULT_CODES_MAX}. No run of dcmp-hil wrote that."
         )
 
 

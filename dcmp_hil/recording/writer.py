@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
-_CHUNK_S, _ROW_BYTES = 0.03, 240  # what is not in a chunk yet is lost with the process
+_CHUNK_DURATION_S, _ROW_BYTES = 0.03, 240  # what is not in a chunk yet is lost with the process
 _CHUNK_BYTES_MIN = 2_000  # bytes of a chunk
-_MOST_LOST = 100  # stretches that the end names
+_LOST_STRETCHES_MAX = 100  # stretches that the end names
 
 
 class RecordingSink:
@@ -99,7 +99,7 @@ class RecordingSink:
             self._file = open_file(path)
             self._writer: Any = Writer(  # its methods have no types
                 cast("IO[bytes]", self._file),  # it asks for no more than write, tell and flush
-                chunk_size=max(_CHUNK_BYTES_MIN, round(_CHUNK_S / period) * _ROW_BYTES),
+                chunk_size=max(_CHUNK_BYTES_MIN, round(_CHUNK_DURATION_S / period) * _ROW_BYTES),
                 compression=CompressionType.ZSTD,
                 enable_data_crcs=True,
             )
@@ -158,7 +158,7 @@ class RecordingSink:
         document = {
             "periods": self._period,
             "events": self._event,
-            "missing": _joined(lost)[:_MOST_LOST],
+            "missing": _joined(lost)[:_LOST_STRETCHES_MAX],
         }
         self._attach()
         self._writer.add_attachment(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FLOOR_V_S = 1000.0
 """V/s, below which nothing is chatter."""
 _VARIATION_RATIO_MAX = 10.0  # the expected variation, from which on it is chatter
-BLOCK = 0.05  # s, over which the variation is a mean
+BLOCK_DURATION_S = 0.05  # s, over which the variation is a mean
 _WINDOW_BLOCKS = 10  # half a second
 _PAUSE_SHARE_MAX = 0.5  # of what is allowed: two blocks below it are a pause
 _BURST_WEIGHT = 2  # of a block with chatter, in the score of bursts with pauses
@@ -29,7 +29,8 @@ _PAUSE_WEIGHT = 1  # of a block without
 _BURST_SCORE_MAX = 40  # at which it is chatter
 _SAMPLES_MIN = 12  # samples that say anything
 _SWING_COUNTS, _SWING_RAD = 10.0, 5e-3  # of the arm, peak to peak
-_DRIFT, _LAGS = 3, 4  # order of what is no swing; periods from a count to the voltage that it makes
+_DRIFT_ORDER = 3  # of a polynomial: what is no swing
+_LAGS_PERIODS = 4  # periods from a count to the voltage that it makes
 _CORRELATION_MIN = 0.5  # correlation
 
 
@@ -54,7 +55,7 @@ class Chatter:
     """
 
     def __init__(self, expected: float, period: float, count: float) -> None:
-        self.block = max(1, round(BLOCK / period))
+        self.block = max(1, round(BLOCK_DURATION_S / period))
         self.samples: Collection[Sample] = ()
         self._count = count
         self._rates: deque[float] = deque(maxlen=_WINDOW_BLOCKS + 1)  # V/s, of the newest blocks
@@ -132,12 +133,12 @@ def cause_of(samples: Collection[Sample], count: float) -> tuple[str, str]:
     t, position, voltage, _ = np.array(list(samples), float).T
     if not (np.isfinite(t + position + voltage).all() and (np.diff(t) > 0.0).all()):
         return _CONTROLLER
-    moved = position - np.polyval(np.polyfit(t - t[0], position, _DRIFT), t - t[0])
+    moved = position - np.polyval(np.polyfit(t - t[0], position, _DRIFT_ORDER), t - t[0])
     change, step = np.diff(voltage), np.diff(position)
     smooth = min(_correlation(voltage[1:], voltage[:-1]), _correlation(step[1:], step[:-1]))
     if smooth > _CORRELATION_MIN and float(np.ptp(moved)) > max(_SWING_COUNTS * count, _SWING_RAD):
         return _SWING
-    follows = max(abs(_correlation(change[lag:], step[: len(step) - lag])) for lag in range(_LAGS))
+    follows = max(abs(_correlation(change[lag:], step[: len(step) - lag])) for lag in range(_LAGS_PERIODS))
     return _ENCODER if follows > _CORRELATION_MIN else _CONTROLLER
 
 

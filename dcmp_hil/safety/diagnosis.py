@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _WINDOW_S = 100e-3  # s
 _SAMPLES_MIN, _SAMPLES_MAX = 12, 64  # samples that say anything; that are looked at
-_ONSETS = 24  # instants in the window at which the fault may have begun
+_ONSET_COUNT = 24  # instants in the window at which the fault may have begun
 _NOISE_COUNTS, _NOISE_MIN_RAD = 0.4, 2e-4  # counts and rad: of a position, quantised and modelled
 _START_DEVIATIONS = (10.0, 10.0, 5.0)  # rad, rad/s, rad/s2: what position, velocity and friction may be
 _GAIN_DEVIATION = 0.25  # of a motor's gain
@@ -103,7 +103,7 @@ class Diagnosis:
         fallen = -self._model.gravity * np.sin(position)
         expected = position - moved_by(t, driven + fallen)
         found: dict[str, list[float]] = {"other": [], "power": [], "motor": [], "encoder": [], "stuck": []}
-        for onset in np.unique(np.linspace(0, len(t) - _SAMPLES_MIN // 2, _ONSETS).astype(int)):
+        for onset in np.unique(np.linspace(0, len(t) - _SAMPLES_MIN // 2, _ONSET_COUNT).astype(int)):
             after = np.arange(len(t)) > onset
             late, early = moved_by(t, driven * after), moved_by(t, driven * ~after)
             push = moved_by(t, after.astype(float))

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from dcmp_hil.safety.chatter import Chatter
     from dcmp_hil.values import Sample
 
-_SAID_EVERY = 1.0  # s, each limit
+_EVENT_PERIOD_S = 1.0  # s, each limit
 _SATURATION_TIME_MAX_S = 0.5  # s in a row at a limit of the voltage that end the run
 _TRACKING_ERROR_TIME_MAX_S = 0.5
 """Seconds in a row that the arm may be too far from the reference: a step takes less."""
 _SPEED_UP_TIME_MIN_S = 0.02  # s from rest to the largest velocity
-_IN_A_ROW = 2.5  # periods between two at most
+_CONSECUTIVE_GAP_PERIODS_MAX = 2.5  # periods between two at most
 
 
 class _Lasting:
@@ -94,8 +94,8 @@ class Limiter:
         self.objection: TripRequest | None = None
         self._slews = slew < math.inf
         self._said: dict[str, float] = {}
-        self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _IN_A_ROW * period)
-        self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, _IN_A_ROW * period)
+        self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
+        self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
         self.clamped = 0
         self._chatter: Chatter | None = None
         self._change = 0.0  # V, sum of |dV| in this block
@@ -189,6 +189,6 @@ class Limiter:
             )
 
     def _say(self, t: float, limit: str, sentence: str) -> None:
-        if not t - self._said.get(limit, -math.inf) < _SAID_EVERY:
+        if not t - self._said.get(limit, -math.inf) < _EVENT_PERIOD_S:
             self._said[limit] = t
             self._notify(Event(t, "WARN", EventKind.LIMIT, sentence, LimitData(limit)))

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
     from dcmp_hil.values import Sample
 
-WATCH = 0.1  # s at 0 V: is the arm at rest
-PUSH = 0.1  # s each way at most
-_PROBE_V, _GENTLE, _OVER_FRICTION = 1.0, 15.0, 2.0  # V; rad/s2; friction that a push must overcome by so much
+REST_TIME_S = 0.1  # s at 0 V: is the arm at rest
+PUSH_TIME_MAX_S = 0.1  # s each way at most
+_PROBE_V, _GENTLE_ACCELERATION_RAD_S2 = 1.0, 15.0  # V; rad/s2
+_FRICTION_RATIO_MIN = 2.0  # times the friction that a push must overcome
 _REST_TRAVEL_MAX_RAD = 0.02  # rad, that the arm may move while it is watched
 _PUSH_TRAVEL_MAX_RAD = 0.03  # rad, at which a push ends early: the whole probe stays within 0.1 rad
 _VOLTAGE_RISEN_SHARE = 0.9  # of the voltage
@@ -33,7 +34,8 @@ _GAIN_RATIO_MAX = 3.0  # measured over believed motor gain, either way, beyond w
 _GAIN_RATIO_WARNING = 1.25  # beyond which it warns
 _SIGNIFICANCE_DEVIATIONS = 4.0  # standard deviations
 _NOISE_COUNTS, _NOISE_MIN_RAD = 0.4, 1e-4  # counts and rad, of a position
-_PUSHED, _STRONGEST = 2.0, 3.0  # rad/s2, what may push besides; times the believed motor gain
+_DISTURBANCE_RAD_S2 = 2.0  # rad/s2, what may push besides
+_MOTOR_GAIN_RATIO_MAX = 3.0  # times the believed motor gain
 _PUSH_TRAVEL_MIN_COUNTS = 2.0  # counts that a push must be expected to move the arm by
 
 
@@ -127,7 +129,10 @@ class PolarityCheck:
     @property
     def telling(self) -> bool:
         """Whether the encoder is fine enough for the probe to say anything."""
-        return 0.5 * self._ku * self._push * PUSH * PUSH > _PUSH_TRAVEL_MIN_COUNTS * self._count
+        return (
+            0.5 * self._ku * self._push * PUSH_TIME_MAX_S * PUSH_TIME_MAX_S
+            > _PUSH_TRAVEL_MIN_COUNTS * self._count
+        )
 
     def check(self, sample: Sample) -> TripRequest | None:
         """Judge a sample; return a TripRequest if the rig contradicts its file.
@@ -153,7 +158,7 @@ class PolarityCheck:
                 f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
                 'Bring it to rest, hanging, and start again; supervisor.probe = "off" starts without it.',
             )
-        if since >= WATCH:
+        if since >= REST_TIME_S:
             self._began, self._x0 = sample.t, sample.position
             self._seen = [(0.0, sample.position, 0.0)]
             self._stage, self.voltage = self._push_up, self._push
@@ -166,7 +171,9 @@ class PolarityCheck:
             self._rise = since
         coasting = _COASTING_SPEED_RATIO * moved / since * self._rise if since > 0.0 else 0.0
         if not (
-            since < PUSH and moved < _PUSH_TRAVEL_MAX_RAD and moved + coasting < _COASTING_TRAVEL_MAX_RAD
+            since < PUSH_TIME_MAX_S
+            and moved < _PUSH_TRAVEL_MAX_RAD
+            and moved + coasting < _COASTING_TRAVEL_MAX_RAD
         ):
             self._length, self._began = since, sample.t
             self._stage, self.voltage = self._push_down, -self._push
@@ -242,7 +249,9 @@ class PolarityCheck:
         t, moved, applied = t[:out], moved[:out], applied[:out]
         columns = np.column_stack([np.ones_like(t), 0.5 * t * t, moved_by(t, applied)])
         noise = math.hypot(_NOISE_COUNTS * self._count, _NOISE_MIN_RAD)
-        usual = np.array([max(self._count, _NOISE_MIN_RAD), _PUSHED, _STRONGEST * self._ku])
+        usual = np.array(
+            [max(self._count, _NOISE_MIN_RAD), _DISTURBANCE_RAD_S2, _MOTOR_GAIN_RATIO_MAX * self._ku]
+        )
         covariance = np.linalg.inv(columns.T @ columns / noise**2 + np.diag(usual**-2))
         moved = moved + moved_by(t, self._gravity * np.sin(moved))  # as if it did not fall
         gain = (covariance @ columns.T @ moved)[2] / noise**2
@@ -265,7 +274,7 @@ def probe_for(
     notify
         Told of the motor's gain.
     """
-    gentle = min(_PROBE_V, _GENTLE / model.ku)
-    voltage = min(voltage_limit, max(gentle, _OVER_FRICTION * model.f1 / model.ku))
+    gentle = min(_PROBE_V, _GENTLE_ACCELERATION_RAD_S2 / model.ku)
+    voltage = min(voltage_limit, max(gentle, _FRICTION_RATIO_MIN * model.f1 / model.ku))
     probe = PolarityCheck(model.ku, voltage, count, notify, gravity=model.gravity)
     return probe if probe.telling else None

@@ -17,11 +17,11 @@ _MOVING_ACCELERATION_SHARE = 0.8  # of the acceleration, between stops
 _APPROACH_ACCELERATION_SHARE = 0.5  # of the acceleration, that the way to a position is laid out for
 _PULL_1_S, _DAMPING_1_S = 5.0, 15.0  # 1/s, of a small distance; of the velocity
 _ACCELERATION_LAG_S = 0.02  # s, over which its own acceleration changes: the voltage has no steps from it
-_JOIN_TOLERANCE = Reference(5e-4, 0.02, 2.0)  # rad, rad/s, rad/s2: so close it goes over into the reference
+_JOIN_TOLERANCES = Reference(5e-4, 0.02, 2.0)  # rad, rad/s, rad/s2: so close it goes over into the reference
 _JUMP_MAX_RAD = 2.0  # larger jumps are governed
 _OVERSHOOT_SHARE = 0.4  # of a jump
 _MOTOR_GAIN_RATIO_MAX = 1.5  # times the believed motor gain
-_BETWEEN_JUMPS = 0.5  # s
+_JUMP_INTERVAL_MIN_S = 0.5  # s
 _GAP_MAX_S, _INTEGRATION_STEP_S = 0.1, 2e-3  # s
 
 
@@ -93,7 +93,7 @@ class ReferenceGovernor:
         distance = target - self.last.position
         if distance != distance:  # the first
             return True
-        allowed = self._bounds.jump(target, distance) and t - self._jumped >= _BETWEEN_JUMPS
+        allowed = self._bounds.jump(target, distance) and t - self._jumped >= _JUMP_INTERVAL_MIN_S
         self._jumped = t if allowed else self._jumped
         return allowed
 
@@ -154,7 +154,8 @@ class ReferenceGovernor:
     def _met(self, reference: Reference) -> bool:
         x, v, a = reference
         near = all(
-            abs(is_ - own) <= met for is_, own, met in zip(reference, self.last, _JOIN_TOLERANCE, strict=True)
+            abs(is_ - own) <= met
+            for is_, own, met in zip(reference, self.last, _JOIN_TOLERANCES, strict=True)
         )
         inside = abs(x) <= self._x and abs(v) <= self._v and abs(a) <= self._a
         return near and inside and abs(x + self._stop * v * abs(v)) <= self._x

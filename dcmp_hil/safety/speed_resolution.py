@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-WINDOW = 8e-3  # s, as the device's; docs/protocol.md, section 8
+SPEED_WINDOW_S = 8e-3  # s, as the device's; docs/protocol.md, section 8
 _WINDOW_COUNTS_MIN = 2.0  # counts in it, below which a limit says nothing
 
 
@@ -18,7 +18,7 @@ def resolution(count: float, period: float) -> float:
     period
         s; the window is rounded up to whole periods.
     """
-    return count / (math.ceil(WINDOW / period - 1e-9) * period)
+    return count / (math.ceil(SPEED_WINDOW_S / period - 1e-9) * period)
 
 
 def lowest_limit(count: float, period: float) -> float:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
     from dcmp_hil.ipc.ring import Ring
 
-INTERVAL = 0.1  # s between two blocks in real time
+BLOCK_PERIOD_S = 0.1  # s between two blocks in real time
 _EVENTS_MAX = 10_000  # events
 
 
@@ -127,7 +127,7 @@ class DispatchThread:
         s between two times.
     """
 
-    def __init__(self, audience: SinkDispatcher, interval: float = INTERVAL) -> None:
+    def __init__(self, audience: SinkDispatcher, interval: float = BLOCK_PERIOD_S) -> None:
         self.audience = audience
         self._interval = interval
         self.finishing = threading.Event()

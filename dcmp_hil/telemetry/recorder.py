@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Recorder", "Sink"]
 
 _SYNCHRONOUS_BLOCK_ROWS_MAX = 4096  # rows a block in virtual time, where no viewer waits, at most
-_CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
+_CAPACITY_ROWS = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
 _END_TIMEOUT_S = 2.0  # s that the end of a run waits for the thread
 
 
@@ -64,7 +64,7 @@ class Recorder:
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self._apart = apart
-        self._ring = apart.ring if apart else Ring(_SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY)
+        self._ring = apart.ring if apart else Ring(_SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY_ROWS)
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now

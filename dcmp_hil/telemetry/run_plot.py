@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     Columns = dict[str, NDArray[np.float64]]
 
-_MOST_POINTS = 20_000
-_BUCKETS = 4_000  # each keeps its lowest and its highest point
-_COLUMNS = 2  # of plots; the first half of the table is on the left
+_POINTS_MAX = 20_000
+_BUCKET_COUNT = 4_000  # each keeps its lowest and its highest point
+_PLOT_COLUMNS = 2  # of plots; the first half of the table is on the left
 _GREY = "#4a4f57"
 _START_ERROR_RATIO = 5.0  # times the largest error of the second half: a start beyond that gets no room
 _DEMAND_CLIP_RATIO = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
@@ -86,12 +86,12 @@ def thinned(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDA
     tuple of ndarray
         Time and values; as they were up to 20,000 points.
     """
-    if len(time) <= _MOST_POINTS:
+    if len(time) <= _POINTS_MAX:
         return time, values
     low = np.where(np.isnan(values), np.inf, values)
     high = np.where(np.isnan(values), -np.inf, values)
     keep = {0, len(time) - 1}
-    for rows in np.array_split(np.arange(len(time)), _BUCKETS):
+    for rows in np.array_split(np.arange(len(time)), _BUCKET_COUNT):
         keep.add(int(rows[np.argmin(low[rows])]))
         keep.add(int(rows[np.argmax(high[rows])]))
     chosen = np.array(sorted(keep))
@@ -100,8 +100,8 @@ def thinned(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDA
 
 def _draw_panels(figure: Figure, columns: Columns) -> None:
     plots = by_plot()
-    rows = math.ceil(len(plots) / _COLUMNS)
-    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
+    rows = math.ceil(len(plots) / _PLOT_COLUMNS)
+    grid = figure.subplots(rows, _PLOT_COLUMNS, sharex=True, squeeze=False)
     panels = list(grid.T.flat)
     for axes in panels[len(plots) :]:
         axes.remove()

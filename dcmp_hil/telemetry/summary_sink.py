@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.memory_sink import MemorySink
     from dcmp_hil.telemetry.statistics import Statistics
 
-_TROUBLES, _TEXT_CHARS_MAX = 100, 500  # characters
+_TROUBLES_MAX, _TEXT_CHARS_MAX = 100, 500  # characters
 
 
 class SummarySink:
@@ -50,7 +50,7 @@ class SummarySink:
 
     def event(self, event: Event) -> None:
         """Process an event; always keep the first warnings and errors."""
-        if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES:
+        if event.level in {"WARN", "ERROR"} and len(self.troubles) < _TROUBLES_MAX:
             self.troubles.append(f"{event.t:.3f} s: {event.text[:_TEXT_CHARS_MAX]}")
         if self.keeper and event.kind is not EventKind.LINK:  # what they came to is in the result
             self.keeper.event(event)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
     from dcmp_hil.telemetry.statistics import Statistics
 
-_CAPACITY = 1 << 15  # rows: 3 s at 10 kHz before any is lost
+_CAPACITY_ROWS = 1 << 15  # rows: 3 s at 10 kHz before any is lost
 _START_TIMEOUT_S = 600.0  # s, a far limit: that it came up is an event, and nothing is armed yet
 _SLOW_START_S = 30.0  # s after which the user is told what is waited for
 _SUMMARY_TIMEOUT_S = 1.5  # s that a process which does nothing has for the figures, at the end of a run
@@ -123,13 +123,22 @@ class TelemetryProcess:
         self._events = 0  # told or not
         self._channel: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self.ring = Ring(_CAPACITY, mapped(ring, size_of(_CAPACITY)))
+        self.ring = Ring(_CAPACITY_ROWS, mapped(ring, size_of(_CAPACITY_ROWS)))
         self.figures = SummarySink(statistics, SharedMemorySink(self._kept) if self._kept else None)
         self.dropped = 0
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
         setup = WorkerSetup(
-            _CAPACITY, ring, ledger, self._kept, statistics, tuple(sinks), model, unattended, mailbox, speed
+            _CAPACITY_ROWS,
+            ring,
+            ledger,
+            self._kept,
+            statistics,
+            tuple(sinks),
+            model,
+            unattended,
+            mailbox,
+            speed,
         )
         self._model = model
         os.write(self._setup, pickle.dumps(setup))
@@ -278,7 +287,7 @@ class TelemetryProcess:
         self._warn(
             self.event,
             f"The telemetry process {why}: no viewer, no recording, no status line, and figures of the last "
-            f"{_CAPACITY} periods only; the run goes on.",
+            f"{_CAPACITY_ROWS} periods only; the run goes on.",
         )
 
     def _warn(self, take: Callable[[Event], None], sentence: str) -> None:

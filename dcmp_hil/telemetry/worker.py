@@ -24,7 +24,7 @@ from dcmp_hil.ipc.shared_memory import Ledger, mapped
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.heap import trim
-from dcmp_hil.telemetry.dispatcher import INTERVAL, DispatchThread, SinkDispatcher
+from dcmp_hil.telemetry.dispatcher import BLOCK_PERIOD_S, DispatchThread, SinkDispatcher
 from dcmp_hil.telemetry.parent_exit import how_it_died
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
@@ -36,9 +36,11 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.statistics import Statistics
 
 UP, FIGURES, DONE = b"up", b"figures", b"done"
-_IN_TURN = 1.0  # s for the other sinks to finish in, one after the other, before they need only end some time
+_ORDERED_FINISH_TIMEOUT_S = (
+    1.0  # s for the other sinks, one after the other; then they need only end some time
+)
 _CLOSE_TIMEOUT_S = 12.0  # s for all of them; a window that is still opening needs that long
-_TRIM_EVERY = 100  # looks into the ring: 10 s
+_TRIM_PERIOD_CHECKS = 100  # looks into the ring: 10 s
 _ORPHAN_CLOSE_TIMEOUT_S = 1.0  # s for those that are late where the parent is gone: no user looks at a window
 
 
@@ -139,7 +141,7 @@ class _TelemetryWorker:
         with select.epoll() as waiting:
             waiting.register(self._channel, select.EPOLLIN)
             while True:
-                waiting.poll(INTERVAL / self._setup.speed)
+                waiting.poll(BLOCK_PERIOD_S / self._setup.speed)
                 ended = self._take_events() or os.getppid() != self._parent
                 self._dispatch()
                 if ended:
@@ -169,7 +171,7 @@ class _TelemetryWorker:
             warnings += getattr(sink, "warnings", ())
             ring = Ring(self._ring.capacity, self._ring.memory)
             audience = SinkDispatcher(ring, [sink], self._tell, self._setup.model)
-            interval = getattr(sink, "interval", INTERVAL) / self._setup.speed
+            interval = getattr(sink, "interval", BLOCK_PERIOD_S) / self._setup.speed
             self._services.append(DispatchThread(audience, interval))
         return warnings
 
@@ -194,7 +196,7 @@ class _TelemetryWorker:
     def _dispatch(self) -> None:
         self._audience.dispatch()
         self._looks += 1
-        if self._looks % _TRIM_EVERY == 0:
+        if self._looks % _TRIM_PERIOD_CHECKS == 0:
             trim()
         lengths = self._keeper.lengths if self._keeper else Lengths()
         figures, ring = self._figures, self._ring
@@ -215,7 +217,9 @@ class _TelemetryWorker:
         clock = MonotonicClock()
         orphaned = os.getppid() != self._parent
         end_ns = clock.now_ns() + int((_ORPHAN_CLOSE_TIMEOUT_S if orphaned else _CLOSE_TIMEOUT_S) * 1e9)
-        late = [service for service in reversed(self._services) if not service.finish(_IN_TURN)]
+        late = [
+            service for service in reversed(self._services) if not service.finish(_ORDERED_FINISH_TIMEOUT_S)
+        ]
         for service in late:
             service.finish(max(0, end_ns - clock.now_ns()) * 1e-9)
 

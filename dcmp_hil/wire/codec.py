@@ -22,7 +22,7 @@ class CorruptFrameError(ValueError):
 
 
 _COUNTS = 0xFFFFFF  # 24 bits
-_ARM, _CLEAR, _RELEASE = 1, 2, 4
+_ARM_FLAG, _CLEAR_FLAG, _RELEASE_FLAG = 1, 2, 4
 _STATUS = [(byte & 7, byte & 8 != 0, byte & 16 != 0, byte >> 5) for byte in range(256)]
 """State, missed, limited and fault class in SAMPLE's byte of status."""
 _DRIVE, _SAMPLE = Struct("<hHHB"), Struct("<HBhBB")
@@ -34,17 +34,17 @@ def _pack_drive(drive: Drive) -> bytes:
     voltage_mV, seq, arm, clear, release, session, ttl_ms = drive
     shared = seq << 3
     if arm:
-        shared |= _ARM
+        shared |= _ARM_FLAG
     if clear:
-        shared |= _CLEAR
+        shared |= _CLEAR_FLAG
     if release:
-        shared |= _RELEASE
+        shared |= _RELEASE_FLAG
     return _DRIVE.pack(voltage_mV, shared, session, ttl_ms)
 
 
 def _unpack_drive(data: bytes) -> Drive:
     voltage_mV, shared, session, ttl_ms = _DRIVE.unpack_from(data)
-    arm, clear, release = bool(shared & _ARM), bool(shared & _CLEAR), bool(shared & _RELEASE)
+    arm, clear, release = bool(shared & _ARM_FLAG), bool(shared & _CLEAR_FLAG), bool(shared & _RELEASE_FLAG)
     return Drive(voltage_mV, shared >> 3, arm, clear, release, session, ttl_ms)
 
 
@@ -110,7 +110,7 @@ _TABLE: dict[int, tuple[Any, Callable[[Any], bytes], Callable[[bytes], Any], int
 }
 _ID_CRC = [crc8(number.to_bytes(2, "little")) for number in range(0x800)]
 """crc8 of every identifier: where that of its payload goes on."""
-_RIGHT = 0xBD  # what crc8 over a whole message and its own crc8 comes to
+_CRC8_RESIDUE = 0xBD  # what crc8 over a whole message and its own crc8 comes to
 _BYTE = [bytes((value,)) for value in range(256)]
 _PACK = {kind: (number << 4, pack) for number, (kind, pack, _, _) in _TABLE.items()}
 _UNPACK = {number: (size + 1, unpack) for number, (_, _, unpack, size) in _TABLE.items()}
@@ -165,7 +165,7 @@ def unpack(frame: Frame, node: int = 0) -> Message | None:
     length, from_bytes = _UNPACK.get(number >> 4, _UNKNOWN)
     if from_bytes is None or len(data) != length or number & 0xF != node:
         return None
-    if crc8(data, _ID_CRC[number]) != _RIGHT:
+    if crc8(data, _ID_CRC[number]) != _CRC8_RESIDUE:
         raise CorruptFrameError(f"frame {number:03X}#{data.hex().upper()}: its crc8 is wrong")
     message: Message = from_bytes(data)
     return message

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
-HEALTH_END = 255
+HEALTH_COUNTER_MAX = 255
 """Where the counters of HEALTH stop."""
 _EVENTS_MIN = 10  # events that make a share worth a warning
 _EVENTS_OF_LARGE_SHARE_MIN = 3  # events: enough if they are a large share of the periods, as in a short run
-_LARGE_SHARE = 0.05  # of the periods
+_LARGE_SHARE_MIN = 0.05  # of the periods
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def growth(first: tuple[int, ...], last: tuple[int, ...]) -> DeviceCounters:
         name: newer - older if newer >= older else newer
         for name, older, newer in zip(_COUNTED, first, last, strict=False)
     }
-    full = tuple(name for name, newer in zip(_COUNTED, last, strict=False) if newer >= HEALTH_END)
+    full = tuple(name for name, newer in zip(_COUNTED, last, strict=False) if newer >= HEALTH_COUNTER_MAX)
     return DeviceCounters(**grown, full=full)
 
 
@@ -101,7 +101,10 @@ def judge(counters: LinkCounters, most: float, most_clock: float) -> list[Concer
         _concern(cause, count, periods if cause != "samples_damaged" else counters.samples + count, text)
         for cause, count, text in _losses(counters)
         if count > most * periods
-        and (count >= _EVENTS_MIN or (count >= _EVENTS_OF_LARGE_SHARE_MIN and count > _LARGE_SHARE * periods))
+        and (
+            count >= _EVENTS_MIN
+            or (count >= _EVENTS_OF_LARGE_SHARE_MIN and count > _LARGE_SHARE_MIN * periods)
+        )
     ]
     device = counters.device
     if device and device.bus_offs:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 _LINE_BYTES_MAX = 31  # bytes of a line without its CR
 _FRAME_LINE = re.compile(rb"t([0-7][0-9A-F]{2})([1-8])((?:[0-9A-F]{2})+)")
 _ADAPTER_ANSWER = re.compile(rb"\x07*(?:[zZ]|V[0-9A-F]{4}|N[0-9A-Z]{4}|F[0-9A-F]{2})?")
-_BYTES_BEFORE = 5
+_HEADER_CHARS = 5
 
 
 def encode(frame: Frame) -> bytes:
@@ -59,6 +59,6 @@ def _decode(line: bytes) -> Frame | None:
     if line[:1] == b"\x07":  # an adapter's answer to a command it did not like, without a CR of its own
         line = line.lstrip(b"\x07")
     found = _FRAME_LINE.fullmatch(line)
-    if found is None or len(line) != _BYTES_BEFORE + 2 * int(found[2]):
+    if found is None or len(line) != _HEADER_CHARS + 2 * int(found[2]):
         return None
     return int(found[1], 16), bytes.fromhex(found[3].decode())

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Truth
 
-_WORD = 0xFFFF_FFFF
-_RESET_PIN = 2  # the parameter RESET_CAUSE
+_UINT32_MAX = 0xFFFF_FFFF
+_RESET_PIN_CAUSE = 2  # the parameter RESET_CAUSE
 _VOLTAGE, _LENGTH = hostlib.VOLTAGE, hostlib.OUT_LENGTH  # wanted in every period
 
 
@@ -61,7 +61,7 @@ class Board:
         self._view = self._bytes[: 4 * (hostlib.OUT_OFFSET + 1)].cast("i")
         self.pins = PlantIO(rig, count_offset)
         self._period_us = self._config["period_us"]
-        self.now_us = start_us & _WORD
+        self.now_us = start_us & _UINT32_MAX
         self.tick_count = 0
         self._c_tick, self._c_receive = lib.hostlib_tick, lib.hostlib_receive  # the two of every period
         self._boot(first_tick)
@@ -71,7 +71,7 @@ class Board:
         """Simulate one period: the held output moves the plant, then the firmware runs its tick."""
         if self.tick_count:
             self.pins.advance(self._view[_VOLTAGE])
-            self.now_us = (self.now_us + self._period_us) & _WORD
+            self.now_us = (self.now_us + self._period_us) & _UINT32_MAX
         self.tick_count += 1
         self._c_tick(self._at, self.now_us, self.pins.count())
 
@@ -96,7 +96,7 @@ class Board:
 
     def advance(self, microseconds: int) -> None:
         """Advance time within a period; the watchdog is checked."""
-        self.now_us = (self.now_us + microseconds) & _WORD
+        self.now_us = (self.now_us + microseconds) & _UINT32_MAX
         self._lib.hostlib_look(self._at, self.now_us)
 
     def link(self, *, up: bool) -> None:
@@ -106,7 +106,7 @@ class Board:
     def reset(self) -> None:
         """Reset the device, as a finger on its button does; the plant goes on as it was."""
         self._config["boot_count"] += 1
-        self._config["reset_cause"] = _RESET_PIN
+        self._config["reset_cause"] = _RESET_PIN_CAUSE
         self._boot(0)
 
     def truth(self) -> Truth:
@@ -144,6 +144,6 @@ class Board:
 
     def _boot(self, first_tick: int) -> None:
         config = LAYOUT.pack(*self._config.values())
-        arguments = (config, self._carrier, self.now_us, first_tick & _WORD)
+        arguments = (config, self._carrier, self.now_us, first_tick & _UINT32_MAX)
         if not self._lib.hostlib_init(self._at, *arguments):
             raise AssertionError(f"the firmware refuses {self._config}")

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-_OWNER_ONLY = 0o700
-_DIGEST = 16  # hexadecimal digits of the content's SHA-256 in a file's name
+_OWNER_ONLY_MODE = 0o700
+_DIGEST_CHARS = 16  # hexadecimal digits of the content's SHA-256 in a file's name
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def folder(key: str) -> Iterator[Path]:
     try:
         place.parent.parent.mkdir(parents=True, exist_ok=True)
         for one in (place.parent, place):
-            one.mkdir(mode=_OWNER_ONLY, exist_ok=True)
+            one.mkdir(mode=_OWNER_ONLY_MODE, exist_ok=True)
             _restrict(one)
         yield place
     except OSError as error:
@@ -55,7 +55,7 @@ def find(place: Path, name: str) -> Path | None:
 
 def keep(made: Path, place: Path) -> Path:
     """Move a compiled file into its folder, under the name of its content; return where it is."""
-    made.chmod(_OWNER_ONLY)
+    made.chmod(_OWNER_ONLY_MODE)
     return made.replace(place / _named(made.name, _digest(made)))
 
 
@@ -65,7 +65,7 @@ def _named(name: str, digest: str) -> str:
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:_DIGEST]
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:_DIGEST_CHARS]
 
 
 def _is_own(path: Path) -> bool:
@@ -88,7 +88,7 @@ def _restrict(place: Path) -> None:
             "XDG_CACHE_HOME at a folder of your own."
         )
     if found.st_mode & _OTHERS_WRITE:
-        place.chmod(_OWNER_ONLY)
+        place.chmod(_OWNER_ONLY_MODE)
 
 
 def _root() -> Path:

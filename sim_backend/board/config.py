@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 SIMULATED, NATIVE = 1, 2  # the parameter BOARD
-VERSION = 0x0001  # 0.1
+FIRMWARE_VERSION = 0x0001  # 0.1
 _WATCHDOG_MS = 20
-_LONGEST_WATCHDOG_MS = 50  # of the protocol
-_REV_S, _REV = 8, 4  # the board's own limits: revolutions a second, revolutions either way
-_MOST_MV = 32_767  # what the wire can say
+_WATCHDOG_MAX_MS = 50  # of the protocol
+_SPEED_LIMIT_REV_S, _TRAVEL_LIMIT_REV = 8, 4  # the board's own limits: revolutions either way
+_VOLTAGE_MAX_MV = 32_767  # what the wire can say
 
 
 LAYOUT = struct.Struct("@13iHB?")
@@ -29,7 +29,7 @@ def _watchdog_ms(rig: Rig, board: int) -> int:
     A virtual board allows what any device may, so that it fits every rig; a real one is built for its own.
     """
     if board in (SIMULATED, NATIVE):
-        return _LONGEST_WATCHDOG_MS
+        return _WATCHDOG_MAX_MS
     return getattr(rig.backend, "watchdog_ms", _WATCHDOG_MS)
 
 
@@ -55,15 +55,15 @@ def board_config(rig: Rig, board: int) -> dict[str, int]:
         "reset_cause": 1,  # power
         "counts_per_rev": counts,
         "period_us": round(1e6 * rig.period),
-        "voltage_limit_mV": round(min(1e3 * rig.amplifier.limit, _MOST_MV)),
+        "voltage_limit_mV": round(min(1e3 * rig.amplifier.limit, _VOLTAGE_MAX_MV)),
         "slew_mV_per_ms": 0 if math.isinf(slew) else max(1, round(slew)),
         "watchdog_ms": _watchdog_ms(rig, board),
-        "speed_limit_counts_s": _REV_S * counts,
-        "travel_limit_counts": _REV * counts,
+        "speed_limit_counts_s": _SPEED_LIMIT_REV_S * counts,
+        "travel_limit_counts": _TRAVEL_LIMIT_REV * counts,
         "last_fault": 0,
         "last_fault_detail": 0,
         "supply_mV": rig.amplifier.supply_mV,
-        "firmware_version": VERSION,
+        "firmware_version": FIRMWARE_VERSION,
         "node": getattr(rig.backend, "node", 0),
         "edge_stamps": 0,
     }

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from sim_backend.plant_fault_hooks import PlantFaults
 
-_WORD = 0xFFFF_FFFF
+_UINT32_MAX = 0xFFFF_FFFF
 
 
 class PlantIO:
@@ -57,7 +57,7 @@ class PlantIO:
 
     def count(self) -> int:
         """Return the encoder's counter, 32 bits."""
-        return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _WORD
+        return (self._encoder_sign * self._encoder.count(self.truth.position) + self._offset) & _UINT32_MAX
 
 
 def _power_stage(rig: Rig) -> Amplifier | None:

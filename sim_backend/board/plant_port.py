@@ -9,8 +9,8 @@ TICK = Struct("<IIHBx")
 """now_us, counts, wait_ms, flags."""
 OUTPUT = Struct("<IIIhBBHBB")
 """The fields of Output."""
-PLANT_TIME = 1  # flag of TICK: the board's clock stands still until the next one
-_UNASKED, _LINK_UP = 1, 2  # flags of OUTPUT
+PLANT_TIME_FLAG = 1  # flag of TICK: the board's clock stands still until the next one
+_UNASKED_FLAG, _LINK_UP_FLAG = 1, 2  # flags of OUTPUT
 
 
 class Output(NamedTuple):
@@ -29,9 +29,9 @@ class Output(NamedTuple):
     @property
     def unasked(self) -> bool:
         """Whether the output changed between two ticks."""
-        return self.flags & _UNASKED != 0
+        return self.flags & _UNASKED_FLAG != 0
 
     @property
     def link_up(self) -> bool:
         """Whether a host has the port open."""
-        return self.flags & _LINK_UP != 0
+        return self.flags & _LINK_UP_FLAG != 0

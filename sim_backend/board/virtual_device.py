@@ -14,7 +14,7 @@ from dcmp_hil.errors import BackendError, LinkError, OpenError
 from sim_backend.board import build
 from sim_backend.board.config import NATIVE, board_config
 from sim_backend.board.plant_io import PlantIO
-from sim_backend.board.plant_port import OUTPUT, PLANT_TIME, TICK, Output
+from sim_backend.board.plant_port import OUTPUT, PLANT_TIME_FLAG, TICK, Output
 from sim_backend.board.symlink import Symlink
 from sim_backend.pacer import Pacer
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Truth
 
 _ARMED_STATES = (2, 3)  # ARMING, RUN: a host is expected to answer every SAMPLE
-_BRISK_MS = 2  # wall: how long a tick in plant time waits for a host that does not drive
-_ANSWER_S = 10.0  # wall: the process is gone if it takes longer
-_END_S = 2.0
+_TICK_WAIT_MAX_MS = 2  # wall: how long a tick in plant time waits for a host that does not drive
+_ANSWER_TIMEOUT_S = 10.0  # wall: the process is gone if it takes longer
+_END_TIMEOUT_S = 2.0
 _LOG_OUTPUTS_MAX = 10_000
-_WORD = 0xFFFF_FFFF
+_UINT32_MAX = 0xFFFF_FFFF
 
 
 class VirtualDevice:
@@ -79,7 +79,7 @@ class VirtualDevice:
         self._program = program
         self._pace = None if clock is None else Pacer(clock, rig.period)
         self.pins = PlantIO(rig, count_offset)
-        self.now_us = start_us & _WORD
+        self.now_us = start_us & _UINT32_MAX
         self._ticked = (self.now_us, 0, 0)  # the same; when its tick was sent and answered, ns
         self.tick_count = 0
         self.port = ""
@@ -124,7 +124,7 @@ class VirtualDevice:
             ) from error
         finally:
             theirs.close()
-        ours.settimeout(_ANSWER_S)
+        ours.settimeout(_ANSWER_TIMEOUT_S)
         self._changes.register(ours, select.POLLIN)
         self._socket = ours
         try:
@@ -144,7 +144,7 @@ class VirtualDevice:
         """End thread and process; the port is gone then."""
         self._ending.set()
         if self._thread is not None:
-            self._thread.join(2.0 * _ANSWER_S)
+            self._thread.join(2.0 * _ANSWER_TIMEOUT_S)
         if self._symlink:
             self._symlink.remove()
         self._end()
@@ -195,7 +195,7 @@ class VirtualDevice:
         """
         now_us, sent_ns, answered_ns = self._ticked
         gone_ns = (self._now_ns() if at_ns is None else at_ns) - answered_ns
-        return (now_us + gone_ns // 1000) & _WORD, (answered_ns - sent_ns) // 1000
+        return (now_us + gone_ns // 1000) & _UINT32_MAX, (answered_ns - sent_ns) // 1000
 
     @property
     def pid(self) -> int:
@@ -218,10 +218,11 @@ class VirtualDevice:
         if self.tick_count:
             self.wait_for_change(0.0)
             self.pins.advance(self.output.voltage_mV)
-            self.now_us = (self.now_us + self._config["period_us"]) & _WORD
+            self.now_us = (self.now_us + self._config["period_us"]) & _UINT32_MAX
         self.tick_count += 1
-        wait_ms = 0 if self._pace else self._patience_ms if self.output.state in _ARMED_STATES else _BRISK_MS
-        flags = 0 if self._pace else PLANT_TIME
+        patience_ms = self._patience_ms if self.output.state in _ARMED_STATES else _TICK_WAIT_MAX_MS
+        wait_ms = 0 if self._pace else patience_ms
+        flags = 0 if self._pace else PLANT_TIME_FLAG
         sent_ns = self._now_ns()
         try:
             self._plug().sendall(TICK.pack(self.now_us, self.pins.count(), wait_ms, flags))
@@ -261,7 +262,7 @@ class VirtualDevice:
         assert process.stdout is not None  # noqa: S101 - it was asked for
         self.port = process.stdout.readline().decode().strip()
         if not self.port:
-            said = process.communicate(timeout=_END_S)[1].decode().strip()
+            said = process.communicate(timeout=_END_TIMEOUT_S)[1].decode().strip()
             raise OpenError(f"The firmware's process did not start: {said}. Look at /dev/pts and /dev/ptmx.")
 
     def _end(self) -> None:
@@ -274,11 +275,11 @@ class VirtualDevice:
             return
         for help_it in (process.terminate, process.kill):
             try:
-                process.wait(_END_S)
+                process.wait(_END_TIMEOUT_S)
                 break
             except subprocess.TimeoutExpired:
                 help_it()
-        process.wait(_END_S)
+        process.wait(_END_TIMEOUT_S)
         for pipe in (process.stdout, process.stderr):
             if pipe is not None:
                 pipe.close()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
 
-_SEQUENCE_MASK, _WORD = 0x1FFF, 2.0**32 - 1
+_SEQUENCE_MASK, _UINT32_MAX = 0x1FFF, 2.0**32 - 1
 
 
 class Reset(FaultModel):
@@ -131,20 +131,22 @@ class Start(FaultModel):
     """Boots the device with counters near their wrap; only `at=boot` means anything."""
 
 
-_TIMES = Number("", 1, 1e6, 1)
+_REPETITIONS_PARAMETER = Number("", 1, 1e6, 1)
 FIRMWARE = {
     "firmware.reset": Kind(Reset, "the device is reset", wired=True),
     "firmware.stop": Kind(
         RogueHost,
         "STOP is sent by another host",
-        {"reason": Number("", 0, 255, 3), "times": _TIMES},
+        {"reason": Number("", 0, 255, 3), "times": _REPETITIONS_PARAMETER},
         wired=True,
     ),
-    "firmware.hello": Kind(RogueHello, "another host wants the device", {"times": _TIMES}, wired=True),
+    "firmware.hello": Kind(
+        RogueHello, "another host wants the device", {"times": _REPETITIONS_PARAMETER}, wired=True
+    ),
     "firmware.drive": Kind(
         RogueDrive,
         "another host drives the device",
-        {"V": Number("V", -32, 32, 5), "times": _TIMES},
+        {"V": Number("V", -32, 32, 5), "times": _REPETITIONS_PARAMETER},
         wired=True,
     ),
     "firmware.version": Kind(OtherVersion, "the device speaks another protocol", wired=True),
@@ -158,8 +160,8 @@ FIRMWARE = {
         Start,
         "the device boots with its counters here",
         {
-            "us": Number("us", 0, _WORD, 0xFFFF_0000),
-            "tick": Number("", 0, _WORD, 0),
+            "us": Number("us", 0, _UINT32_MAX, 0xFFFF_0000),
+            "tick": Number("", 0, _UINT32_MAX, 0),
             "count": Number("counts", -(2.0**31), 2.0**31 - 1, 0),
         },
         wired=True,

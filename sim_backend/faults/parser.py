@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from sim_backend.faults.base import Choice, Kind, Value
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
-_TIME = {"s": 1.0, "ms": 1e-3, "": 1.0}
-_PER_CENT = 0.01
-_LATEST_S = 1e6
+_SECONDS_PER_UNIT = {"s": 1.0, "ms": 1e-3, "": 1.0}
+_PERCENT_RATIO = 0.01
+_START_TIME_MAX_S = 1e6
 
 
 class WrongFaultError(ValueError):
@@ -62,7 +62,7 @@ def _value(key: str, text: str, kind: Kind) -> Value:
         return text if text in param.words else check(key, text, param)
     number, unit = _split(key, text, param)
     if unit == "%" and param.unit == "":
-        number, unit = number * _PER_CENT, ""
+        number, unit = number * _PERCENT_RATIO, ""
     if unit == "s" and param.unit == "ms":
         number, unit = 1e3 * number, "ms"
     if unit not in ("", param.unit):
@@ -74,9 +74,9 @@ def _time(key: str, text: str) -> Value:
     if key == "at" and text == "boot":
         return text
     found = _NUMBER.fullmatch(text)
-    if found and found[2] in _TIME:
-        value = float(found[1]) * _TIME[found[2]]
-        if 0.0 <= value <= _LATEST_S:
+    if found and found[2] in _SECONDS_PER_UNIT:
+        value = float(found[1]) * _SECONDS_PER_UNIT[found[2]]
+        if 0.0 <= value <= _START_TIME_MAX_S:
             return value
     words = 'a time such as 3s or 200ms, or "boot"' if key == "at" else "a time such as 3s or 200ms"
     raise ValueError(f'{key}: got "{text}"; expected {words}.')

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sim_backend.board.board import Board
     from sim_backend.faults.listener import FaultListener
 
-_NO_ENCODER = 4096.0  # counts a revolution in which faults of an ideal encoder are told
+_IDEAL_ENCODER_COUNTS_PER_REV = 4096.0  # counts a revolution in which faults of an ideal encoder are told
 
 
 class FaultPlan:
@@ -114,7 +114,7 @@ def _facts(rig: Rig) -> RigFacts:
         period=rig.period,
         ku=rig.plant.ku,
         believed_ku=rig.model.ku_rad_s2_V,
-        count_rad=math.tau / (rig.encoder.counts or _NO_ENCODER),
+        count_rad=math.tau / (rig.encoder.counts or _IDEAL_ENCODER_COUNTS_PER_REV),
         node=backend.node if isinstance(backend, Device) else 0,
     )
 

@@ -250,12 +250,14 @@ class Shove(PlantFault):
 
 
 _COUNTS = Number("counts", -1e6, 1e6, 1000)
-_OFTEN = {"times": Number("", 1, 1e6, 1), "every": Number("periods", 1, 1e6, 3)}
-_VOLTS = {"V": Number("V", 0, 100, 1)}
+_REPETITION_PARAMETERS = {"times": Number("", 1, 1e6, 1), "every": Number("periods", 1, 1e6, 3)}
+_VOLTAGE_PARAMETER = {"V": Number("V", 0, 100, 1)}
 PLANT = {
     "plant.enc_stuck": Kind(Stuck, "the encoder shows one position for ever"),
-    "plant.enc_jump": Kind(Jump, "the count jumps, and stays", {"counts": _COUNTS, **_OFTEN}),
-    "plant.enc_glitch": Kind(Glitch, "the count is wrong for a period", {"counts": _COUNTS, **_OFTEN}),
+    "plant.enc_jump": Kind(Jump, "the count jumps, and stays", {"counts": _COUNTS, **_REPETITION_PARAMETERS}),
+    "plant.enc_glitch": Kind(
+        Glitch, "the count is wrong for a period", {"counts": _COUNTS, **_REPETITION_PARAMETERS}
+    ),
     "plant.enc_noise": Kind(EncoderNoise, "the encoder is noisy", {"counts": Number("counts", 0, 1e4, 1)}),
     "plant.enc_missed": Kind(Missed, "counts get lost", {"p": Number("", 0, 1, 0.02)}),
     "plant.enc_sign": Kind(EncoderSign, "the encoder counts the other way"),
@@ -263,9 +265,9 @@ PLANT = {
     "plant.motor_sign": Kind(MotorSign, "the motor's wires are swapped"),
     "plant.power": Kind(Power, "the motor has no power"),
     "plant.gain": Kind(Gain, "the motor has another gain", {"factor": Number("", -10, 10, 0.5)}),
-    "plant.saturation": Kind(Saturation, "the amplifier gives no more than this", _VOLTS),
+    "plant.saturation": Kind(Saturation, "the amplifier gives no more than this", _VOLTAGE_PARAMETER),
     "plant.offset": Kind(Offset, "the amplifier adds a voltage", {"V": Number("V", -100, 100, 1)}),
-    "plant.dead_band": Kind(DeadBand, "the amplifier gives nothing below this", _VOLTS),
+    "plant.dead_band": Kind(DeadBand, "the amplifier gives nothing below this", _VOLTAGE_PARAMETER),
     "plant.shove": Kind(
         Shove,
         "the arm is pushed",

@@ -30,7 +30,7 @@ _FIRST = 25_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  
 @pytest.fixture(autouse=True)
 def _elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take ports that no run on this computer takes, and no display."""
-    monkeypatch.setattr(window, "PORT", _FIRST)
+    monkeypatch.setattr(window, "VIEWER_PORT", _FIRST)
     monkeypatch.setattr(window, "WEB_PORT", _FIRST + 500)
     monkeypatch.setattr(window.served, "__defaults__", (_FIRST,))
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):

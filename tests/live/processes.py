@@ -39,7 +39,7 @@ def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subpro
 
     `first` is the first of the ports on which recordings are served, and looked for.
     """
-    ports = f"viewer.PORT = {first}; viewer.served.__defaults__ = ({first},)"
+    ports = f"viewer.VIEWER_PORT = {first}; viewer.served.__defaults__ = ({first},)"
     process = subprocess.Popen(
         [sys.executable, "-c", f"from dcmp_hil.telemetry.rerun import viewer\n{ports}\n{_MAIN}", *arguments],
         cwd=folder,

@@ -33,7 +33,7 @@ def test_process_is_gone_with_the_device() -> None:
 
 
 def test_process_that_hangs_is_ended_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim_backend.board.virtual_device._END_S", 0.1)
+    monkeypatch.setattr("sim_backend.board.virtual_device._END_TIMEOUT_S", 0.1)
     with VirtualDevice(bench(), clock=SimulatedClock()) as device:
         pid = device.pid
         os.kill(pid, signal.SIGSTOP)
@@ -45,7 +45,7 @@ def test_process_that_ends_by_itself_is_an_error(monkeypatch: pytest.MonkeyPatch
         os.kill(device.pid, signal.SIGKILL)
         with pytest.raises(LinkError, match="has ended"):
             device.run_ticks(10)
-    monkeypatch.setattr("sim_backend.board.virtual_device._ANSWER_S", 0.05)
+    monkeypatch.setattr("sim_backend.board.virtual_device._ANSWER_TIMEOUT_S", 0.05)
     with VirtualDevice(bench(), clock=SimulatedClock()) as device:
         os.kill(device.pid, signal.SIGSTOP)
         with pytest.raises(LinkError, match="does not answer"):

@@ -34,7 +34,7 @@ class Host:
 
     def __init__(self, folder: Path, *options: str) -> None:
         environment = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-        ports = f"from dcmp_hil.telemetry.rerun import viewer; viewer.PORT = {_FIRST}"
+        ports = f"from dcmp_hil.telemetry.rerun import viewer; viewer.VIEWER_PORT = {_FIRST}"
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-c", f"{ports}; from dcmp_hil.cli import main; main()", *_RUN, *options],

@@ -146,7 +146,7 @@ from pathlib import Path
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.telemetry.runs import VIEW, blocks
-window.PORT = int(sys.argv[1])
+window.VIEWER_PORT = int(sys.argv[1])
 sink = RerunSink(VIEW, Path(sys.argv[3]), "connect")
 made = blocks(3000)
 for block in made[:10]:

@@ -161,7 +161,7 @@ def test_recorder_counts_what_a_hanging_sink_kept_from_the_others(monkeypatch: p
 def test_recorder_overwrites_the_oldest_and_counts_when_not_drained(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "_CAPACITY", 64)
+    monkeypatch.setattr(module, "_CAPACITY_ROWS", 64)
     sink, stuck = _Sink(), _Hangs()
     recorder = _recorder(stuck, sink, in_line=False)
     _record(recorder, 1)

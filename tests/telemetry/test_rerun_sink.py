@@ -190,7 +190,7 @@ def test_spawn_without_a_display_warns_and_goes_on(tmp_path: Path) -> None:
 def test_connect_without_a_viewer_warns_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as free:
         free.bind((window.LOOPBACK, 0))
-        monkeypatch.setattr(window, "PORT", free.getsockname()[1])
+        monkeypatch.setattr(window, "VIEWER_PORT", free.getsockname()[1])
     before_ns = MonotonicClock().now_ns()
     sink = RerunSink(VIEW, tmp_path / "run.rrd", "connect")
     assert MonotonicClock().now_ns() - before_ns < 5e9
@@ -203,8 +203,8 @@ def test_connect_to_a_server_that_accepts_and_stays_silent_warns(monkeypatch: py
     with socket.socket() as mute:  # as a frozen viewer does
         mute.bind((window.LOOPBACK, 0))
         mute.listen()
-        monkeypatch.setattr(window, "PORT", mute.getsockname()[1])
-        assert window.answers(window.PORT, 10.0)
+        monkeypatch.setattr(window, "VIEWER_PORT", mute.getsockname()[1])
+        assert window.answers(window.VIEWER_PORT, 10.0)
         sink = RerunSink(VIEW, None, "connect")
     assert "goes on without one" in sink.warnings[0]
     sink.close()

@@ -51,11 +51,11 @@ run = subprocess.Popen(command)
 found, viewer, seen = set(), None, 0
 while run.poll() is None:
     found |= sockets()
-    if viewer is None and window.answers(window.PORT, 0.01):
+    if viewer is None and window.answers(window.VIEWER_PORT, 0.01):
         seen = 1
         viewer = subprocess.Popen(
             [window.viewer_binary(), "--headless", "--bind", "127.0.0.1", "--port", "auto",
-             "--memory-limit", "300MB", "--connect", window.proxy_url(window.PORT)],
+             "--memory-limit", "300MB", "--connect", window.proxy_url(window.VIEWER_PORT)],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=window.viewer_environment())
     time.sleep(0.02)
 if viewer is not None:

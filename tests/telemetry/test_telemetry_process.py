@@ -135,7 +135,7 @@ def test_the_end_takes_two_seconds_at_most_in_any_state_of_the_process(number: s
 
 
 def test_what_was_overwritten_meanwhile_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_CAPACITY", 256)
+    monkeypatch.setattr(module, "_CAPACITY_ROWS", 256)
     told: list[str] = []
     apart = TelemetryProcess(Statistics(T), keep=True, warn=told.append)
     apart.open()

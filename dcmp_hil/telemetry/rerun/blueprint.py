@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TIMELINE = "loop_time"
 _WINDOW_S = 10.0  # s on the axis of every plot
 _JOINT, _VOLTAGE, _TIMING = "joint/", "control/voltage_V", "loop/timing_us"  # plots with a place of their own
-_BEYOND_LIMIT = 1.3  # so that the lines of the limit show
+_AXIS_LIMIT_RATIO = 1.3  # so that the lines of the limit show
 
 
 def dashboard(rig: RigView) -> rrb.Blueprint:
@@ -92,7 +92,7 @@ def _plot_of(path: str, lines: int, rig: RigView) -> rrb.TimeSeriesView:
     return plot(
         path,
         legend=lines > 1,
-        reach=None if limit is None else _BEYOND_LIMIT * limit,
+        reach=None if limit is None else _AXIS_LIMIT_RATIO * limit,
         name="Timing, worst [µs]" if path == _TIMING else "",
     )
 

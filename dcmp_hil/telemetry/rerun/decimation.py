@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Column = NDArray[np.float64]
-_FROM_HZ, _BUCKETS_PER_SECOND = 2_000.0, 1_000.0
+_DECIMATED_RATE_MIN_HZ, _BUCKET_RATE_HZ = 2_000.0, 1_000.0
 
 
 def rows_per_bucket(period: float) -> int:
     """Return how many periods are drawn as two points; 1 leaves them as they are."""
-    return 1 if period * _FROM_HZ >= 1.0 else max(2, round(1.0 / (period * _BUCKETS_PER_SECOND)))
+    return 1 if period * _DECIMATED_RATE_MIN_HZ >= 1.0 else max(2, round(1.0 / (period * _BUCKET_RATE_HZ)))
 
 
 def peaks(t: Column, values: Column, rows: int) -> tuple[Column, Column]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Call = tuple[str, list[rr.TimeColumn], rr.ComponentColumnList]
 
-_POSES_PER_SECOND = 50
+_POSE_RATE_HZ = 50
 _LATE_MIN_PERIODS = 0.5  # of a period
 
 
@@ -137,7 +137,7 @@ class Frames:
 
     def _slow(self, block: Block) -> Iterator[Call]:
         """Yield what 50 points a second are enough for: the pendulum, and the lines of the limit."""
-        slots = np.floor(block["t"] * _POSES_PER_SECOND + 1e-6).astype(np.int64)
+        slots = np.floor(block["t"] * _POSE_RATE_HZ + 1e-6).astype(np.int64)
         rows = np.flatnonzero(np.diff(slots, prepend=self._last_slot))
         self._last_slot = int(slots[-1])
         if not len(rows):

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_BINS = 61  # odd, so that a nominal period lies in the middle of a bar
+_BIN_COUNT = 61  # odd, so that a nominal period lies in the middle of a bar
 _SEND_PERIOD_S = 1.0  # s between two pictures of it
 
 
@@ -23,10 +23,10 @@ class FixedRangeHistogram:
     """
 
     def __init__(self, low: float, high: float) -> None:
-        self._edges = 1e6 * np.linspace(low, high, _BINS + 1)
+        self._edges = 1e6 * np.linspace(low, high, _BIN_COUNT + 1)
         self.centres_us = 0.5 * (self._edges[1:] + self._edges[:-1])
         self.widths_us = np.diff(self._edges)
-        self.counts = np.zeros(_BINS, np.int64)
+        self.counts = np.zeros(_BIN_COUNT, np.int64)
         self._due = -np.inf
 
     def add(self, t: NDArray[np.float64], durations: NDArray[np.float64]) -> bool:

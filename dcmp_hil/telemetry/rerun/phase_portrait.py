@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 PATH = "phase"
 _TRAIL_S = 10.0  # s
-_POINTS_PER_SECOND, _PICTURES_PER_SECOND = 50, 5
-_AXIS_MIN = 0.1  # rad and rad/s: a portrait of an arm at rest is not one of its noise
-_AXIS, _TEXT = (80, 84, 92), (150, 155, 160)
+_POINT_RATE_HZ, _PICTURE_RATE_HZ = 50, 5
+_AXIS_HALF_RANGE_MIN = 0.1  # rad and rad/s: a portrait of an arm at rest is not one of its noise
+_AXIS_RGB, _TEXT_RGB = (80, 84, 92), (150, 155, 160)
 _AXIS_MARGIN_RATIO = 1.12  # of the axes, for their labels
 _AXIS_OVERSHOOT_MAX = 1.05  # of an axis: what is a little more than 1 has no axis to 2
 
@@ -59,7 +59,7 @@ class Portrait:
         table = table[np.isfinite(table).all(axis=1)]
         if not len(table):
             return
-        slots = np.floor(table[:, 0] * _POINTS_PER_SECOND + 1e-6).astype(np.int64)
+        slots = np.floor(table[:, 0] * _POINT_RATE_HZ + 1e-6).astype(np.int64)
         new = table[np.flatnonzero(np.diff(slots, prepend=self._slot))]
         self._slot = int(slots[-1])
         points = np.concatenate((self.points, new))
@@ -70,7 +70,7 @@ class Portrait:
         if not len(self.points):
             return None
         t = float(self.points[-1, 0])
-        picture = int(t * _PICTURES_PER_SECOND + 1e-6)
+        picture = int(t * _PICTURE_RATE_HZ + 1e-6)
         if picture == self._picture:
             return None
         self._picture = picture
@@ -101,7 +101,10 @@ class Portrait:
     def _find_reach(self) -> tuple[float, float]:
         """Return the ends of the axes, rad and rad/s: never smaller than before, so that nothing jitters."""
         most = np.abs(self.points[:, 1:]).max(axis=0)
-        position, velocity = max(most[0], most[2], _AXIS_MIN), max(most[1], most[3], _AXIS_MIN)
+        position, velocity = (
+            max(most[0], most[2], _AXIS_HALF_RANGE_MIN),
+            max(most[1], most[3], _AXIS_HALF_RANGE_MIN),
+        )
         return max(self._reach[0], round_up(position)), max(self._reach[1], round_up(velocity))
 
     def _scaled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -113,7 +116,7 @@ class Portrait:
 def _axes(position: float, velocity: float) -> list[Call]:
     square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)], float)
     strips = [square, np.array([(-1.0, 0.0), (1.0, 0.0)]), np.array([(0.0, -1.0), (0.0, 1.0)])]
-    lines = rr.LineStrips2D.columns(strips=strips, colors=[_AXIS] * 3, radii=[0.004] * 3).partition([3])
+    lines = rr.LineStrips2D.columns(strips=strips, colors=[_AXIS_RGB] * 3, radii=[0.004] * 3).partition([3])
     places = np.array(
         [
             (-1, _AXIS_MARGIN_RATIO),
@@ -124,5 +127,5 @@ def _axes(position: float, velocity: float) -> list[Call]:
         float,
     )
     labels = [f"{-position:g} rad", f"{position:g} rad", f"{-velocity:g} rad/s", f"{velocity:g} rad/s"]
-    names = rr.Points2D.columns(positions=places, labels=labels, colors=[_TEXT] * 4, radii=[0.001] * 4)
+    names = rr.Points2D.columns(positions=places, labels=labels, colors=[_TEXT_RGB] * 4, radii=[0.001] * 4)
     return [(f"{PATH}/axes", lines), (f"{PATH}/axes/ends", names.partition([4]))]

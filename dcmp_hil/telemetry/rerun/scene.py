@@ -40,14 +40,21 @@ LANES = {
 }
 """Lanes of the timeline of states, with the colour of each state."""
 
-_WIDTHS = {TRUE: 5.0, ESTIMATE: 3.2, REFERENCE: 1.6, FAINT: 1.0, DEMAND: 1.0, VOLTAGE: 1.6}  # points
+_LINE_WIDTHS_POINTS = {
+    TRUE: 5.0,
+    ESTIMATE: 3.2,
+    REFERENCE: 1.6,
+    FAINT: 1.0,
+    DEMAND: 1.0,
+    VOLTAGE: 1.6,
+}
 _SERIES_COLOURS = (
     *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
     *((237, 201, 72), (176, 122, 161), (255, 157, 167), (156, 117, 95), (186, 176, 172)),
 )
 """Colours of lines that only have to differ."""
-_LENGTH = 1.0
-_FRONT = 0.12  # the arm moves before the dial
+_ARM_LENGTH = 1.0
+_ARM_DEPTH = 0.12  # the arm moves before the dial
 
 
 def lane_path(lane: str) -> str:
@@ -90,7 +97,7 @@ def log_style(stream: rr.RecordingStream, plot: str, signals: Sequence[Signal]) 
 
 def _width(signal: Signal) -> float:
     """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
-    return _WIDTHS.get(signal.colour, 1.2)
+    return _LINE_WIDTHS_POINTS.get(signal.colour, 1.2)
 
 
 def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -158,9 +165,9 @@ def _log_stand(stream: rr.RecordingStream) -> None:
 
 def _log_arm(stream: rr.RecordingStream) -> None:
     rod = rr.Capsules3D(
-        lengths=[_LENGTH],
+        lengths=[_ARM_LENGTH],
         radii=[0.045],
-        translations=[(0, 0, _FRONT)],
+        translations=[(0, 0, _ARM_DEPTH)],
         rotation_axis_angles=[rr.RotationAxisAngle(axis=(1, 0, 0), degrees=90)],
         colors=[TRUE],
         fill_mode="Solid",
@@ -168,15 +175,15 @@ def _log_arm(stream: rr.RecordingStream) -> None:
     stream.log(f"{ARM}/rod", rod, static=True)
     ends = rr.Ellipsoids3D(
         half_sizes=[(0.13, 0.13, 0.13), (0.09, 0.09, 0.09)],
-        centers=[(0, -_LENGTH, _FRONT), (0, 0, _FRONT)],
+        centers=[(0, -_ARM_LENGTH, _ARM_DEPTH), (0, 0, _ARM_DEPTH)],
         colors=[(170, 190, 210), (60, 64, 70)],
         fill_mode="Solid",
     )
     stream.log(f"{ARM}/ends", ends, static=True)
     outline = rr.LineStrips3D(
         [
-            [(0, 0, _FRONT), (0, -1.14, _FRONT)],
-            _circle(0.17, 0.0) + np.array([0.0, -_LENGTH, _FRONT]),
+            [(0, 0, _ARM_DEPTH), (0, -1.14, _ARM_DEPTH)],
+            _circle(0.17, 0.0) + np.array([0.0, -_ARM_LENGTH, _ARM_DEPTH]),
         ],
         colors=[REFERENCE],
         radii=[0.010],

@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 
     Viewer = Literal["spawn", "web", "serve", "connect", "none"]
 
-_SERVER_START = 60.0  # s, a far limit: that it listens is an event, and nothing is armed yet
+_SERVER_START_TIMEOUT_S = 60.0  # s, a far limit: that it listens is an event, and nothing is armed yet
 _CLOSE_TIMEOUT_S = 12.0  # s, for all of it; long enough for a window that is still opening
 _VIEWER_FLUSH_TIMEOUT_S = 1.5
 """Seconds, for a viewer that was there before: if it is frozen, the last call never returns."""
-_FILE_PATIENCE = 30.0  # s, for a disk that is slow
+_FILE_TIMEOUT_S = 30.0  # s, for a disk that is slow
 _SERVER_MEMORY_LIMIT = "64MiB"
 """Of what late viewers get: two minutes at 1 kHz; what is sent once comes again."""
 _RESEND_PERIOD_S = 10.0  # s
-_FILE_SPAN = 1.0  # s of a run that go into a file at once
-_VIEWER_PATIENCE = 5.0  # s, for a viewer that is
+_FILE_BLOCK_DURATION_S = 1.0  # s of a run that go into a file at once
+_VIEWER_TIMEOUT_S = 5.0  # s, for a viewer that is
 _START_DATA_BYTES = 400e3  # bytes: scenery and layout are 250 kB
 
 
@@ -96,7 +96,7 @@ class RerunSink:
         record: Path | None,
         viewer: Viewer,
         application: str = "dcmp-hil",
-        port: int = window.PORT,
+        port: int = window.VIEWER_PORT,
         *,
         spare: bool = False,
         history: str = _SERVER_MEMORY_LIMIT,
@@ -202,33 +202,33 @@ class RerunSink:
             raise ConfigError(
                 NO_ROOM.format(file=record, room=1e-3 * room, beginning=1e-3 * _START_DATA_BYTES)
             )
-        outlet = StreamWorker(self._stream(), _FILE_PATIENCE, _CLOSE_TIMEOUT_S, file=record)
+        outlet = StreamWorker(self._stream(), _FILE_TIMEOUT_S, _CLOSE_TIMEOUT_S, file=record)
         outlet.do(partial(warm_up, self._rig))
         # A footer would take memory for every chunk for as long as the run goes on: 25 MB a minute.
         outlet.do(partial(begin, rr.FileSink(record, write_footer=False), self._rig))
         try:
-            begun = outlet.settle(_FILE_PATIENCE)
+            begun = outlet.settle(_FILE_TIMEOUT_S)
         except RuntimeError as error:  # a file that can be opened, on a disk that is full
             outlet.leave()
             raise ConfigError(f"The recording cannot begin: {error}. Free some space.") from None
         if not begun:
             outlet.leave()
             raise ConfigError(f"The recording cannot begin: {record} does not grow. Free some space.")
-        self._feeds.append(Feed(outlet, self._rig, _FILE_SPAN))
+        self._feeds.append(Feed(outlet, self._rig, _FILE_BLOCK_DURATION_S))
 
     def _open_viewer(self, target: rr.GrpcSink | rr.GrpcServerSink, ending: float) -> StreamWorker:
-        outlet = StreamWorker(self._stream(), _VIEWER_PATIENCE, ending)
+        outlet = StreamWorker(self._stream(), _VIEWER_TIMEOUT_S, ending)
         outlet.do(partial(warm_up, self._rig))
         outlet.do(partial(begin, target, self._rig))
         self._feeds.append(Feed(outlet, self._rig, again=_RESEND_PERIOD_S))
         return outlet
 
     def _connect(self) -> None:
-        if window.speaks_http2(window.PORT):
-            self._open_viewer(rr.GrpcSink(window.proxy_url(window.PORT)), _VIEWER_FLUSH_TIMEOUT_S)
+        if window.speaks_http2(window.VIEWER_PORT):
+            self._open_viewer(rr.GrpcSink(window.proxy_url(window.VIEWER_PORT)), _VIEWER_FLUSH_TIMEOUT_S)
             return
         self.warnings.append(
-            f"No viewer answers on 127.0.0.1:{window.PORT}; the run goes on without one. "
+            f"No viewer answers on 127.0.0.1:{window.VIEWER_PORT}; the run goes on without one. "
             "Start it first with: rerun --bind 127.0.0.1"
         )
 
@@ -248,7 +248,7 @@ class RerunSink:
         for port in window.free_ports(first_port):
             target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
             outlet = self._open_viewer(target, _CLOSE_TIMEOUT_S)
-            if window.serves(port, os.getpid(), _SERVER_START):
+            if window.serves(port, os.getpid(), _SERVER_START_TIMEOUT_S):
                 self.port = port
                 return outlet
             outlet.leave()  # another process took the port first

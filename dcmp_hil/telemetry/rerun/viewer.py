@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 LOOPBACK = "127.0.0.1"
-PORT, WEB_PORT = 9876, 9090
-_PORTS_TRIED = 50
+VIEWER_PORT, WEB_PORT = 9876, 9090
+_PORT_ATTEMPTS_MAX = 50
 _ANSWER_TIMEOUT_S = 3.0
 """Seconds that a server may take on a busy computer; a port without a listener refuses at once."""
 _FETCH_TIMEOUT_S = 10.0
 """Seconds; a window takes a second or two to open, and a run in virtual time may be over by then."""
-_CAUGHT_UP = 5  # looks in a row, 0.1 s apart, with nothing left to send
+_CAUGHT_UP_CHECKS = 5  # looks in a row, 0.1 s apart, with nothing left to send
 _CONNECTIONS = Path("/proc/net/tcp")
 _ESTABLISHED, _LISTENING = "01", "0A"  # in there
 _HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(
@@ -49,7 +49,7 @@ def proxy_url(port: int) -> str:
 
 def free_ports(first: int) -> Iterator[int]:
     """Yield the ports from `first` on that are free at the moment when each is asked for."""
-    for port in range(first, first + _PORTS_TRIED):
+    for port in range(first, first + _PORT_ATTEMPTS_MAX):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does
             try:
@@ -59,7 +59,7 @@ def free_ports(first: int) -> Iterator[int]:
         yield port
 
 
-def free_port(first: int = PORT) -> int | None:
+def free_port(first: int = VIEWER_PORT) -> int | None:
     """Return the first port from `first` on without a listener; None if there is none near."""
     return next(free_ports(first), None)
 
@@ -196,9 +196,9 @@ def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
     )
 
 
-def served(first: int = PORT) -> list[int]:
+def served(first: int = VIEWER_PORT) -> list[int]:
     """Return the ports on which a recording is served, among those that a run would take."""
-    return [port for port in range(first, first + _PORTS_TRIED) if speaks_http2(port)]
+    return [port for port in range(first, first + _PORT_ATTEMPTS_MAX) if speaks_http2(port)]
 
 
 def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
@@ -208,7 +208,7 @@ def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_FETCH_TIMEOUT_S * 1e9)
     quiet = 0
-    while quiet < _CAUGHT_UP and clock.now_ns() < end_ns and viewer.poll() is None:
+    while quiet < _CAUGHT_UP_CHECKS and clock.now_ns() < end_ns and viewer.poll() is None:
         unsent = _unsent(port)
         quiet = quiet + 1 if unsent and not any(unsent) else 0
         pause(0.1)
