@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.observers.discretisation import Copy
 
-_ROUNDS = 7
+_ROUND_COUNT = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class _NoTelemetry:
 
 
 def _row(what: str, unit: str, goal: str, measure: Callable[[], float]) -> Row:
-    return _row_of(what, [measure() for _ in range(_ROUNDS)], unit, goal)
+    return _row_of(what, [measure() for _ in range(_ROUND_COUNT)], unit, goal)
 
 
 def _row_of(what: str, values: Sequence[float], unit: str, goal: str) -> Row:

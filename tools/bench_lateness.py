@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.wire.frame import Frame
 
-_SPREAD = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
+_SPREAD_RATIO_MAX = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
 _PRIORITY = 80
 _C = """
 #define _GNU_SOURCE
@@ -110,7 +110,7 @@ class Lateness:
     @property
     def goal(self) -> str:
         """Requirement on the ratio, or why there is none."""
-        if self.c_spread > _SPREAD:
+        if self.c_spread > _SPREAD_RATIO_MAX:
             return f"<= 1.2; not judged: C's own spread is {self.c_spread:.1f}"
         return "<= 1.2"
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.telemetry.sink_factories import SinkMaker
 
-_PORT = 29_000
-_RECORDS, _ROUNDS = 2000, 25
+_FIRST_PORT = 29_000
+_RECORDS_PER_ROUND, _ROUND_COUNT = 2000, 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +42,9 @@ class Endurance:
 
 def everything(rig: Rig, folder: Path) -> list[SinkMaker]:
     """Return as many sinks as a run can have: its recording, the dashboard in a file and served."""
-    port = free_port(_PORT)
+    port = free_port(_FIRST_PORT)
     if port is None:
-        raise OSError(f"no free port from {_PORT} on")
+        raise OSError(f"no free port from {_FIRST_PORT} on")
     return [
         partial(recording, folder / "run.mcap", rig.period, about(rig), rig_json(rig)),
         partial(dashboard, view_of(rig), folder / "run.rrd", "serve", port),
@@ -65,11 +65,11 @@ def record_us() -> float:
         Timing(1e-3, 0.0, 1e-5),
     )
     costs = []
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUND_COUNT):
         began = time.perf_counter()
-        for _ in range(_RECORDS):
+        for _ in range(_RECORDS_PER_ROUND):
             recorder.record(cycle)
-        costs.append(1e6 * (time.perf_counter() - began) / _RECORDS)
+        costs.append(1e6 * (time.perf_counter() - began) / _RECORDS_PER_ROUND)
     return statistics.median(costs)
 
 

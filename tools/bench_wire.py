@@ -24,9 +24,9 @@ from sim_backend.board.virtual_device import VirtualDevice
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_TRIPS = 300
-_ROUNDS = 15
-_PATIENCE = 1.0
+_TRIPS_PER_ROUND = 300
+_ROUND_COUNT = 15
+_ANSWER_TIMEOUT_S = 1.0
 _ECHO = """
 #define _GNU_SOURCE
 #include <fcntl.h>
@@ -76,7 +76,7 @@ def round_trips() -> tuple[list[float], list[float]]:
     """Return round trips in us: medians of batches, firmware and echo in turn."""
     firmware, echo = [], []
     with _device() as to_firmware, _echo() as to_echo:
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUND_COUNT):
             firmware.append(_batch(to_firmware))
             echo.append(_batch(to_echo))
     return firmware, echo
@@ -84,7 +84,7 @@ def round_trips() -> tuple[list[float], list[float]]:
 
 def _batch(trip: Callable[[], None]) -> float:
     times = []
-    for _ in range(_TRIPS):
+    for _ in range(_TRIPS_PER_ROUND):
         began = time.perf_counter()
         trip()
         times.append(time.perf_counter() - began)
@@ -102,7 +102,7 @@ def _device() -> Iterator[Callable[[], None]]:
 
             def trip() -> None:
                 link.send(pack(ParameterGet(Parameter.PERIOD_US)))
-                while (frame := link.receive(_PATIENCE)) is not None:
+                while (frame := link.receive(_ANSWER_TIMEOUT_S)) is not None:
                     if isinstance(unpack(frame), ParameterValue):
                         return
                 raise TimeoutError("the firmware does not answer")
@@ -127,7 +127,7 @@ def _echo() -> Iterator[Callable[[], None]]:
             text=True,
         ) as peer:
             assert peer.stdout is not None  # noqa: S101 - it was asked for
-            with serial.Serial(peer.stdout.readline().strip(), 1_000_000, timeout=_PATIENCE) as port:
+            with serial.Serial(peer.stdout.readline().strip(), 1_000_000, timeout=_ANSWER_TIMEOUT_S) as port:
                 question = cobs.encode(pack(ParameterGet(Parameter.PERIOD_US)))
                 answer = cobs.encode(pack(ParameterValue(Parameter.PERIOD_US, 1000, 0)))
 

@@ -16,20 +16,20 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from pathlib import Path
 
-OPTKEYR, OPTCR = 0x4002_3C08, 0x4002_3C14
-OPTION_BYTES = 0x1FFF_C000
-KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
-LOCK, START = 1 << 0, 1 << 1
-COMMANDS = LOCK | START
-RESERVED = 0xF000_0010  # 0 in every STM32F405
-BOR_LEV = 0b11 << 2  # 0b11: off, 0b10: level 1, 0b01: level 2, 0b00: level 3
+OPTKEYR_ADDRESS, OPTCR_ADDRESS = 0x4002_3C08, 0x4002_3C14
+OPTION_BYTES_ADDRESS = 0x1FFF_C000
+OPTION_KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
+LOCK_BIT, START_BIT = 1 << 0, 1 << 1
+COMMANDS = LOCK_BIT | START_BIT
+RESERVED_BITS = 0xF000_0010  # 0 in every STM32F405
+BOR_LEV_BITS = 0b11 << 2  # 0b11: off, 0b10: level 1, 0b01: level 2, 0b00: level 3
 _RDP_AT, _RDP_NONE, _RDP_FOR_EVER = 8, 0xAA, 0xCC
 _NAMES = {0b11: "off", 0b10: "level 1", 0b01: "level 2", 0b00: "level 3"}
 
-DHCSR, HALTED = 0xE000_EDF0, 1 << 17  # of the processor's debug unit
-FREEZE, FREEZE_IWDG = 0xE004_2008, 1 << 12  # the watchdog stands still with the processor
+DHCSR_ADDRESS, HALTED_BIT = 0xE000_EDF0, 1 << 17  # of the processor's debug unit
+FREEZE_ADDRESS, FREEZE_IWDG_BIT = 0xE004_2008, 1 << 12  # the watchdog stands still with the processor
 WORD_BYTES = 4
-_WRITE_MS = 2000  # more than an erase of the option bytes takes
+_WRITE_TIMEOUT_MS = 2000  # more than an erase of the option bytes takes
 
 
 class OptionError(RuntimeError):
@@ -50,7 +50,7 @@ def is_open(word: int) -> bool:
 
 def level(word: int) -> str:
     """Return the name of an option word's brown-out level."""
-    return _NAMES[(word & BOR_LEV) >> 2]
+    return _NAMES[(word & BOR_LEV_BITS) >> 2]
 
 
 def planned(word: int) -> int | None:
@@ -76,28 +76,28 @@ def planned(word: int) -> int | None:
             "reading, or the word was not read rightly. Nothing was written. Look at the wires and the "
             "supply, and try again. This program ends no protection: that erases all that is in the chip."
         )
-    if word & RESERVED:
+    if word & RESERVED_BITS:
         raise OptionError(
             f"option word {word:#010x}: bits are set that are 0 in an STM32F405, so the word was not read "
             "rightly, or the chip is another. Nothing was written. Look at the wires, and try again."
         )
-    if word & COMMANDS != LOCK:
+    if word & COMMANDS != LOCK_BIT:
         raise OptionError(
             f"option word {word:#010x}: a write was begun and not ended. Nothing was written now. Switch the "
             "board's supply off and on, and call this again."
         )
-    if not word & BOR_LEV:
+    if not word & BOR_LEV_BITS:
         return None
-    return word & ~COMMANDS & ~BOR_LEV
+    return word & ~COMMANDS & ~BOR_LEV_BITS
 
 
 def writes(settings: int) -> list[Write]:
     """Return what puts settings into the option word: unlock, write, start; lock it again after that."""
     return [
-        *(Write(OPTKEYR, key) for key in KEYS),
-        Write(OPTCR, settings),
-        Write(OPTCR, settings | START),
-        Write(OPTCR, settings | LOCK),
+        *(Write(OPTKEYR_ADDRESS, key) for key in OPTION_KEYS),
+        Write(OPTCR_ADDRESS, settings),
+        Write(OPTCR_ADDRESS, settings | START_BIT),
+        Write(OPTCR_ADDRESS, settings | LOCK_BIT),
     ]
 
 
@@ -111,8 +111,8 @@ def check_written(settings: int, word: int) -> None:
     """
     if (settings ^ word) & ~COMMANDS:
         raise OptionError(
-            f"option word {word:#010x} after it was written, expected {settings | LOCK:#010x}. Nothing else "
-            "was written. Switch the board's supply off and on, and try again."
+            f"option word {word:#010x} after it was written, expected {settings | LOCK_BIT:#010x}. Nothing "
+            "else was written. Switch the board's supply off and on, and try again."
         )
 
 
@@ -127,21 +127,21 @@ def _commander(*commands: str, held: bool = False) -> list[str]:
 
 def read_by_probe(file: Path) -> list[str]:
     """Return the command that reads the option word into a file, over a debug probe."""
-    return _commander(f"savemem {OPTCR:#x} {WORD_BYTES} {file}")
+    return _commander(f"savemem {OPTCR_ADDRESS:#x} {WORD_BYTES} {file}")
 
 
 def hold_by_probe(file: Path) -> list[str]:
     """Return the command that halts the chip before its first instruction; DHCSR in a file shows it."""
-    freeze = f"write32 {FREEZE:#x} {FREEZE_IWDG:#x}"
-    return _commander("reset halt", freeze, f"savemem {DHCSR:#x} {WORD_BYTES} {file}", held=True)
+    freeze = f"write32 {FREEZE_ADDRESS:#x} {FREEZE_IWDG_BIT:#x}"
+    return _commander("reset halt", freeze, f"savemem {DHCSR_ADDRESS:#x} {WORD_BYTES} {file}", held=True)
 
 
 def write_by_probe(settings: int) -> list[str]:
     """Return the command that writes settings into the option word of a halted chip, and resets it."""
     *first, lock = (f"write32 {write.address:#x} {write.value:#010x}" for write in writes(settings))
-    return _commander(*first, f"sleep {_WRITE_MS}", lock, "reset", held=True)
+    return _commander(*first, f"sleep {_WRITE_TIMEOUT_MS}", lock, "reset", held=True)
 
 
 def read_by_boot_loader(file: Path, talk: list[str], port: str) -> list[str]:
     """Return the command that reads the option bytes into a file, over the chip's own boot loader."""
-    return [*talk, "-r", str(file), "-S", f"{OPTION_BYTES:#x}:{WORD_BYTES}", port]
+    return [*talk, "-r", str(file), "-S", f"{OPTION_BYTES_ADDRESS:#x}:{WORD_BYTES}", port]

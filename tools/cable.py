@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 if TYPE_CHECKING:
     from types import TracebackType
 
-_CHUNK = 4096
+_CHUNK_BYTES_MAX = 4096
 
 
 class Cable:
@@ -73,4 +73,4 @@ class Cable:
                 if end == self._hand:
                     return
                 with contextlib.suppress(OSError):  # no room, or the other side has gone: it is lost
-                    os.write(ways[end], os.read(end, _CHUNK))
+                    os.write(ways[end], os.read(end, _CHUNK_BYTES_MAX))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample, Truth
     from sim_backend.plant import Plant
 
-_WINDOW = 10  # blocks
+_WINDOW_BLOCKS = 10  # blocks
 _REFERENCES = (
     (),
     ("reference.rate_rad_s=2.0",),
@@ -67,7 +67,7 @@ def variation_of(result: Result | None, period: float) -> float:
     if result is None or "voltage_sent_V" not in result.columns:
         return math.nan
     voltage, time = result.columns["voltage_sent_V"], result.columns["time_s"]
-    periods = max(1, round(BLOCK_DURATION_S / period)) * _WINDOW
+    periods = max(1, round(BLOCK_DURATION_S / period)) * _WINDOW_BLOCKS
     if len(voltage) <= periods:
         return 0.0
     way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(voltage)))))
@@ -125,13 +125,13 @@ class Case(SimBackend):
             sample = super().read()
         if not self.misplaced:
             return sample
-        place = self.truth().position / _COUNT
+        place = self.truth().position / _COUNT_RAD
         count = math.floor(place)
         up = place - count > 0.5 + self._edges[count % len(self._edges)]
-        return sample._replace(position=_COUNT * (count + up))
+        return sample._replace(position=_COUNT_RAD * (count + up))
 
 
-_COUNT = math.tau / 4096
+_COUNT_RAD = math.tau / 4096
 
 
 class _Between:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from tests.helpers import FaultySim
 
-COUNTS = (
+COUNTS_PER_REV = (
     64,
     100,
     200,
@@ -40,7 +40,7 @@ COUNTS = (
     16_384,
     65_536,
 )
-RATES = (200, 500, 1000, 2000, 5000)
+RATES_HZ = (200, 500, 1000, 2000, 5000)
 _FAULTS: tuple[tuple[str, type[FaultySim]], ...] = (
     ("E01 stuck encoder", helpers.StuckEncoder),
     ("P02 lost power", helpers.LostPower),
@@ -98,8 +98,8 @@ def main() -> int:
     """Print both tables; 1 if a healthy run did not end well."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--counts", type=int, nargs="*", default=COUNTS)
-    parser.add_argument("--rates", type=int, nargs="*", default=RATES)
+    parser.add_argument("--counts", type=int, nargs="*", default=COUNTS_PER_REV)
+    parser.add_argument("--rates", type=int, nargs="*", default=RATES_HZ)
     parser.add_argument(
         "--reactions", type=int, nargs="*", default=(256, 1024, 4096), help="counts, at 1 kHz"
     )

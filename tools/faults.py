@@ -27,9 +27,9 @@ _HEAD = (
     "| fault | runs | violations | diagnosed right, % | to 0 V, ms: median | max | bound | outcomes |",
     "|---|---:|---:|---:|---:|---:|---:|---|",
 )
-_ENOUGH = 95.0  # %
-_SHOWN, _AGAIN = 3, 25
-_FIRST_VARIANTS = 2
+_RIGHT_MIN_PERCENT = 95.0  # %
+_SHOWN_MAX, _REARM_PERIOD_SEEDS = 3, 25
+_FIRST_VARIANT_COUNT = 2
 
 
 @dataclass
@@ -80,7 +80,7 @@ def run_row(place: int, seeds: Sequence[int]) -> Line:
     row = ROWS[place]
     line = Line(row.name, row.bound_ms, open=row.open)
     for seed in seeds:
-        line.add(seed, judge(row, seed, rearm=seed % _AGAIN == 0))
+        line.add(seed, judge(row, seed, rearm=seed % _REARM_PERIOD_SEEDS == 0))
     return line
 
 
@@ -108,8 +108,8 @@ def tell(lines: Sequence[Line], seconds: float, write: Callable[[str], object]) 
     write("\n".join((*_HEAD, *map(str, lines))) + "\n\n")
     judged = [line for line in lines if not line.open]
     for line in lines:
-        for seed, found in sorted(line.violations.items())[:_SHOWN]:
-            write(f"{line.fault}, seed {seed}: {'; '.join(found[:_SHOWN])}\n")
+        for seed, found in sorted(line.violations.items())[:_SHOWN_MAX]:
+            write(f"{line.fault}, seed {seed}: {'; '.join(found[:_SHOWN_MAX])}\n")
     runs, right = sum(line.runs for line in judged), sum(line.right for line in judged)
     broken = sum(len(line.violations) for line in judged)
     write(
@@ -118,7 +118,7 @@ def tell(lines: Sequence[Line], seconds: float, write: Callable[[str], object]) 
         "rows are in neither figure.\n"
     )
     false_trips = any(line.right < line.runs for line in judged if line.fault == "none")
-    return int(broken > 0 or false_trips or not 100.0 * right / runs >= _ENOUGH)
+    return int(broken > 0 or false_trips or not 100.0 * right / runs >= _RIGHT_MIN_PERCENT)
 
 
 def variants(places: Sequence[int]) -> list[int]:
@@ -176,7 +176,7 @@ def main() -> int:
     blocks = min(len(wells), 20)
     with ProcessPoolExecutor(asked.processes) as pool:
         further = asked.seeds if asked.further is None else min(asked.further, asked.seeds)
-        runs = [asked.seeds if variant < _FIRST_VARIANTS else further for variant in variants(places)]
+        runs = [asked.seeds if variant < _FIRST_VARIANT_COUNT else further for variant in variants(places)]
         seeds = [part_of(range(asked.first, asked.first + n), asked.part) for n in runs]
         lines = pool.map(run_row, places, seeds)
         healthy_seeds = [wells[block::blocks] for block in range(blocks)]

@@ -20,22 +20,22 @@ from sim_backend.board.config import board_config
 from tools import brown_out
 from tools.artefact import BOARDS
 from tools.brown_out import OptionError
-from tools.record import ADDRESS, RecordLink, image, record
+from tools.record import RECORD_ADDRESS, RecordLink, image, record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dcmp_hil.config import Rig
 
-VECTORS, CODE = 0x0800_0000, 0x0800_C000
+VECTORS_ADDRESS, CODE_ADDRESS = 0x0800_0000, 0x0800_C000
 INSTALL = {
     "stm32flash": "apt install --no-install-recommends stm32flash",
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
 _TALK = ["stm32flash", "-b", "115200"]  # to the boot loader
-_DAC_V = 10.0  # V, full scale unless it is said
-_SUPPLY_V = (1.0, 100.0)  # V
-_NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
+_DAC_FULL_SCALE_V = 10.0  # V, full scale unless it is said
+_SUPPLY_RANGE_V = (1.0, 100.0)  # V
+_BOARD_NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
 
 
 class Piece(NamedTuple):
@@ -77,7 +77,7 @@ def record_of(
             f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
         )
     full_scale = _full_scale(rig, board, full_scale_V, supply_V)
-    config = board_config(rig, _NUMBERS[board])
+    config = board_config(rig, _BOARD_NUMBERS[board])
     full_scale_mV = round(1e3 * full_scale)
     if config["voltage_limit_mV"] > full_scale_mV:
         raise ConfigError(
@@ -97,10 +97,10 @@ def _full_scale(rig: Rig, board: str, full_scale_V: float | None, supply_V: floa
         if supply_V is not None or rig_supply != "none":
             where = "--supply-V" if supply_V is not None else "amplifier.supply_V"
             raise ConfigError(f"{where}: {board} divides no supply. Leave it out; see --full-scale-V.")
-        return _DAC_V if full_scale_V is None else full_scale_V
+        return _DAC_FULL_SCALE_V if full_scale_V is None else full_scale_V
     if full_scale_V is not None:
         raise ConfigError(f"--full-scale-V: the full scale of {board} is the motor's supply. Say --supply-V.")
-    if supply_V is None or not _SUPPLY_V[0] <= supply_V <= _SUPPLY_V[1]:
+    if supply_V is None or not _SUPPLY_RANGE_V[0] <= supply_V <= _SUPPLY_RANGE_V[1]:
         raise ConfigError(
             f"--supply-V: got {supply_V}; {board} puts out a part of the motor's supply, and every limit is "
             "wrong by the factor by which this number is. Measure the supply, and say it: --supply-V 24."
@@ -119,7 +119,7 @@ def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
         to = ["--target", "stm32f405rg", "--format", "bin", "--base-address"]
         return [["pyocd", "flash", *to, f"{piece.address:#x}", str(piece.file)] for piece in pieces]
     writes = [[*_TALK, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port] for piece in pieces]
-    return [*writes, [*_TALK, "-g", f"{VECTORS:#x}", port]]
+    return [*writes, [*_TALK, "-g", f"{VECTORS_ADDRESS:#x}", port]]
 
 
 def _arguments() -> argparse.Namespace:
@@ -153,10 +153,13 @@ def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
             supply_V=asked.supply_V,
         )
         kept.write_bytes(image(made))
-        pieces.append(Piece(kept, ADDRESS))
+        pieces.append(Piece(kept, RECORD_ADDRESS))
     if asked.only in (None, "program"):
         base = asked.firmware / asked.board
-        parts = [Piece(Path(f"{base}.code.bin"), CODE), Piece(Path(f"{base}.vectors.bin"), VECTORS)]
+        parts = [
+            Piece(Path(f"{base}.code.bin"), CODE_ADDRESS),
+            Piece(Path(f"{base}.vectors.bin"), VECTORS_ADDRESS),
+        ]
         missing = [part.file for part in parts if not part.file.is_file()]
         if missing:
             raise ConfigError(
@@ -216,7 +219,7 @@ def _set_brown_out(file: Path) -> None:
     if settings is None:
         sys.stdout.write("brown-out level: level 3\n")
         return
-    if not _read(brown_out.hold_by_probe(file), file) & brown_out.HALTED:
+    if not _read(brown_out.hold_by_probe(file), file) & brown_out.HALTED_BIT:
         raise OptionError(
             "the processor did not halt, so that its program could disturb the write. Nothing was written. "
             "Connect the probe's reset line, and try again."

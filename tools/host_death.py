@@ -18,13 +18,14 @@ from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from sim_backend.board.virtual_device import VirtualDevice
 from tools.cable import Cable
-from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
+from tools.hosts import ATTEMPTS_MAX, DOUBT_MAX_US, WAIT_TIMEOUT_S, is_driven, start_host, wait
 
 if TYPE_CHECKING:
     import subprocess
 
-OFF_US, SEEN_US = 21_000, 2_000  # watchdog and a period; where the device sees its line go down
-QUEUED_US = 3_000  # how old a command may be that still counts
+OFF_TIME_MAX_US = 21_000  # watchdog and a period
+DETECTION_TIME_MAX_US = 2_000  # where the device sees its line go down
+COMMAND_AGE_MAX_US = 3_000  # how old a command may be that still counts
 WAYS = {"SIGKILL": ("LINK_DOWN", (-9,)), "SIGSTOP": ("HOST_SILENT", (3, 4)), "unplug": ("LINK_DOWN", (3, 4))}
 """What the device must say, and with what the host may end: a stopped one goes on later, and finds out."""
 
@@ -59,9 +60,17 @@ class Death(NamedTuple):
         fed_us, seen_us = self.fed_us - self.doubt_us, (self.seen_us or 0) - self.doubt_us
         silent = f"0 V {1e-3 * self.silent_us:.1f} ms after the last command"
         return [
-            *([silent] if self.silent_us > OFF_US else []),
-            *([f"a command counted {1e-3 * fed_us:.1f} ms after the deed"] if fed_us > QUEUED_US else []),
-            *([f"0 V {1e-3 * seen_us:.1f} ms after the line went down"] if seen_us > SEEN_US else []),
+            *([silent] if self.silent_us > OFF_TIME_MAX_US else []),
+            *(
+                [f"a command counted {1e-3 * fed_us:.1f} ms after the deed"]
+                if fed_us > COMMAND_AGE_MAX_US
+                else []
+            ),
+            *(
+                [f"0 V {1e-3 * seen_us:.1f} ms after the line went down"]
+                if seen_us > DETECTION_TIME_MAX_US
+                else []
+            ),
             *([f"the device says {self.fault}"] if self.fault != fault else []),
             *([f"the host ended with {self.exit_code}"] if self.exit_code not in codes else []),
             *([] if self.stayed_off else ["the amplifier came on again"]),
@@ -70,7 +79,7 @@ class Death(NamedTuple):
 
 def die(way: str) -> Death:
     """Run a real host with a virtual device, separate them, and return the result."""
-    for tries in range(1, TRIES + 1):
+    for tries in range(1, ATTEMPTS_MAX + 1):
         with ExitStack() as stack:
             device = stack.enter_context(VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()))
             device.start()
@@ -79,12 +88,12 @@ def die(way: str) -> Death:
             try:
                 if is_driven(device, host):
                     death = _part(device, host, way, cable)
-                    if death.doubt_us <= MOST_DOUBT_US:
+                    if death.doubt_us <= DOUBT_MAX_US:
                         return death._replace(tries=tries)
             finally:
                 host.kill()
-                host.communicate(timeout=BOUND_S)
-    raise RuntimeError(f"{TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
+                host.communicate(timeout=WAIT_TIMEOUT_S)
+    raise RuntimeError(f"{ATTEMPTS_MAX} hosts ran into the watchdog by themselves: this computer is too busy")
 
 
 def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable: Cable | None) -> Death:
@@ -101,7 +110,7 @@ def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable:
     off = next(output for output in device.log if output.fault and not output.enable)
     if way == "SIGSTOP":
         host.send_signal(signal.SIGCONT)
-    code = host.wait(BOUND_S)
+    code = host.wait(WAIT_TIMEOUT_S)
     since = [output for output in device.log if output.since_us >= off.since_us]
     deed_us = done_us if way == "SIGSTOP" else began_us
     return Death(
@@ -127,10 +136,10 @@ def table(deaths: list[Death]) -> str:
         seen = [1e-3 * death.seen_us for death in these if death.seen_us is not None]
         if not these:
             continue
-        line = (f"{max(seen):.1f}", f"{1e-3 * SEEN_US:g}") if seen else ("", "")
+        line = (f"{max(seen):.1f}", f"{1e-3 * DETECTION_TIME_MAX_US:g}") if seen else ("", "")
         cells = (
             way, len(these), f"{statistics.median(off):.1f}", f"{max(off):.1f}",
-            f"{1e-3 * max(death.silent_us for death in these):.1f}", f"{1e-3 * OFF_US:g}", *line,
+            f"{1e-3 * max(death.silent_us for death in these):.1f}", f"{1e-3 * OFF_TIME_MAX_US:g}", *line,
             ", ".join(sorted({death.fault for death in these})),
             ", ".join(sorted({str(death.exit_code) for death in these})),
             sum(bool(death.wrong) for death in these), sum(death.tries - 1 for death in these),

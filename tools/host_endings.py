@@ -18,7 +18,7 @@ from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
-from tools.hosts import BOUND_S, MOST_DOUBT_US, TRIES, is_driven, start_host, wait
+from tools.hosts import ATTEMPTS_MAX, DOUBT_MAX_US, WAIT_TIMEOUT_S, is_driven, start_host, wait
 
 if TYPE_CHECKING:
     import subprocess
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 """Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
-_AT_S = 1.2  # s, device time at which a host's own part raises
+_RAISE_TIME_S = 1.2  # s, device time at which a host's own part raises
 
 _PART = f'''
 import time
@@ -43,7 +43,7 @@ class _Raises:
         self._says = what
 
     def _look(self, t):
-        if t >= {_AT_S}:
+        if t >= {_RAISE_TIME_S}:
             waited = Path("/proc/self/schedstat").read_text().split()[1]
             Path("deed").write_text(f"{{time.monotonic_ns()}} {{waited}}")
             if self._what is not None:
@@ -146,7 +146,7 @@ class Ending(NamedTuple):
 
 def end(name: str) -> Ending:
     """Run a real host with a virtual device, end the host, and return the result."""
-    for tries in range(1, TRIES + 1):
+    for tries in range(1, ATTEMPTS_MAX + 1):
         with (
             tempfile.TemporaryDirectory() as place,
             VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()) as device,
@@ -158,12 +158,12 @@ def end(name: str) -> Ending:
             try:
                 if is_driven(device, host):
                     ending = _end(device, host, name, folder)
-                    if ending is not None and ending.doubt_us <= MOST_DOUBT_US:
+                    if ending is not None and ending.doubt_us <= DOUBT_MAX_US:
                         return ending._replace(tries=tries)
             finally:
                 host.kill()
-                host.communicate(timeout=BOUND_S)
-    raise RuntimeError(f"{TRIES} hosts ran into the watchdog by themselves: this computer is too busy")
+                host.communicate(timeout=WAIT_TIMEOUT_S)
+    raise RuntimeError(f"{ATTEMPTS_MAX} hosts ran into the watchdog by themselves: this computer is too busy")
 
 
 def _start(port: str, way: Way, folder: Path) -> subprocess.Popen[bytes]:
@@ -187,7 +187,7 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
     deed_us, doubt_us = device.clock_us(at_ns)
     off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
     off_us = next(o.since_us for o in device.log if o.since_us > off.since_us and not o.voltage_mV)
-    said = host.communicate(timeout=BOUND_S)[1].decode().strip().splitlines()
+    said = host.communicate(timeout=WAIT_TIMEOUT_S)[1].decode().strip().splitlines()
     gone_s = 1e-9 * (clock.now_ns() - at_ns)
     files = [file for file in folder.glob("runs/*/*") if file.stat().st_size]
     return Ending(

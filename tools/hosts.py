@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     from sim_backend.board.virtual_device import VirtualDevice
 
-BOUND_S = 60.0
-TRIES, MOST_DOUBT_US = 10, 500
-_LOOK_S = 0.002
-_TOO_LATE = (3, 4)  # its samples, or its device's commands, came too late
+WAIT_TIMEOUT_S = 60.0
+ATTEMPTS_MAX, DOUBT_MAX_US = 10, 500
+_POLL_PERIOD_S = 0.002
+_LATE_EXIT_CODES = (3, 4)  # its samples, or its device's commands, came too late
 _DRIVEN_mV = 100
 
 
@@ -48,12 +48,12 @@ def is_driven(device: VirtualDevice, host: subprocess.Popen[bytes]) -> bool:
     if host.poll() is None:
         return True
     said = host.stderr.read().decode() if host.stderr else ""
-    if host.returncode not in _TOO_LATE:
+    if host.returncode not in _LATE_EXIT_CODES:
         raise RuntimeError(f"a host ended with {host.returncode} before it drove: {said}")
     return False
 
 
-def wait(holds: Callable[[], object], what: str, within_s: float = BOUND_S) -> None:
+def wait(holds: Callable[[], object], what: str, within_s: float = WAIT_TIMEOUT_S) -> None:
     """Poll every 2 ms until a condition holds.
 
     Raises
@@ -66,4 +66,4 @@ def wait(holds: Callable[[], object], what: str, within_s: float = BOUND_S) -> N
     while not holds():
         if clock.now_ns() > until_ns:
             raise TimeoutError(f"waited {within_s:g} s until {what}")
-        pause(_LOOK_S)
+        pause(_POLL_PERIOD_S)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tests.attacks.limit_runs import Healthy, Outcome
 
-_SHOWN = 5
+_SHOWN_MAX = 5
 
 
 class Cell(NamedTuple):
@@ -99,7 +99,7 @@ def main() -> None:
         *table(found),
         "",
         counted,
-        *wrong[:_SHOWN],
+        *wrong[:_SHOWN_MAX],
     ]
     text = "\n".join(lines) + "\n"
     sys.stdout.write(text)

@@ -20,22 +20,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sim_backend.board.plant_port import OUTPUT
-from tools.record import ADDRESS, RecordLink, image, record
+from tools.record import RECORD_ADDRESS, RecordLink, image, record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 QEMU, INSTALL = "qemu-system-arm", "apt install --no-install-recommends qemu-system-arm"
-_CHUNK = 4096
-_END_S = 2.0
-_EMULATOR_FAILED = 3
+_CHUNK_BYTES_MAX = 4096
+_END_TIMEOUT_S = 2.0
+_EMULATOR_FAILED_EXIT_CODE = 3
 
 
 def command(elf: Path, record_file: Path, host_fd: int, plant_fd: int) -> list[str]:
     """Return what starts the emulator, with host and plant behind descriptors."""
     return [
         QEMU, "-machine", "netduinoplus2", "-nodefaults", "-nographic", "-kernel", str(elf),
-        "-device", f"loader,file={record_file},addr={ADDRESS:#x},force-raw=on",
+        "-device", f"loader,file={record_file},addr={RECORD_ADDRESS:#x},force-raw=on",
         "-chardev", f"socket,id=host,fd={host_fd}", "-serial", "chardev:host",
         "-chardev", f"socket,id=plant,fd={plant_fd}", "-serial", "chardev:plant",
     ]  # fmt: skip
@@ -74,7 +74,7 @@ def carry(terminal: int, board_host: socket.socket, plant: socket.socket, board_
         poll.register(end, select.POLLIN)
     while True:
         for end, _ in poll.poll():
-            data = os.read(end, _CHUNK)
+            data = os.read(end, _CHUNK_BYTES_MAX)
             if not data:
                 return
             ways[end](data)
@@ -107,7 +107,7 @@ def main() -> int:
             )
         except OSError as error:
             sys.stderr.write(f"{QEMU}: {error.strerror}. {INSTALL}\n")
-            return _EMULATOR_FAILED
+            return _EMULATOR_FAILED_EXIT_CODE
         host_end.close()
         plant_end.close()
         signal.signal(signal.SIGTERM, lambda *_: emulator.kill())
@@ -120,7 +120,7 @@ def main() -> int:
             carry(master, board_host, plant, board_plant)
         finally:
             emulator.kill()
-            emulator.wait(_END_S)
+            emulator.wait(_END_TIMEOUT_S)
     return 0
 
 

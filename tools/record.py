@@ -11,8 +11,8 @@ from fastcrc import crc16
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-ADDRESS = 0x0800_4000  # sector 1, and sector 2 behind it
-SECTOR_BYTES, SECTORS = 16 * 1024, 2
+RECORD_ADDRESS = 0x0800_4000  # sector 1, and sector 2 behind it
+SECTOR_BYTES, SECTOR_COUNT = 16 * 1024, 2
 MAGIC = int.from_bytes(b"DCMP", "little")
 _CHECKED, _WORD = Struct("<2I8i3I2i16x"), Struct("<I")
 RECORD_BYTES = _CHECKED.size + _WORD.size
@@ -63,5 +63,5 @@ def record(
 
 
 def image(first: bytes) -> bytes:
-    """Return both sectors with this record and nothing else: what is flashed at ADDRESS."""
-    return first.ljust(SECTORS * SECTOR_BYTES, b"\xff")
+    """Return both sectors with this record and nothing else: what is flashed at RECORD_ADDRESS."""
+    return first.ljust(SECTOR_COUNT * SECTOR_BYTES, b"\xff")

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from rerun.experimental import LogEntry, ViewerClient, ViewerState
 
 APT = "apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1"
-_START = 30.0  # s: the first picture of a software renderer takes a while
-_LOAD = 60.0  # s
-_SETTLE = 0.7  # s after a seek
-_GREETING_GONE = 5.0  # s after the start, the viewer's first notice leaves the picture
+_START_TIMEOUT_S = 30.0  # s: the first picture of a software renderer takes a while
+_LOAD_TIMEOUT_S = 60.0  # s
+_SETTLE_TIME_S = 0.7  # s after a seek
+_GREETING_TIME_S = 5.0  # s after the start, the viewer's first notice leaves the picture
 FIRST_PORT = 21_000  # tried for the viewer's remote control
 
 
@@ -70,14 +70,14 @@ def headless_viewer(*sources: str, size: str = "1600x900") -> Iterator[ViewerCli
         env=viewer_environment(),
     ) as process:
         try:
-            if not answers(port, _START):
+            if not answers(port, _START_TIMEOUT_S):
                 raise OSError(f"the headless viewer did not start; it needs Vulkan: {APT}")
             yield ViewerClient.connect(proxy_url(port))
         finally:
             process.kill()
 
 
-def wait_until_loaded(viewer: ViewerClient, within: float = _LOAD) -> ViewerState:
+def wait_until_loaded(viewer: ViewerClient, within: float = _LOAD_TIMEOUT_S) -> ViewerState:
     """Return the viewer's state once a recording is there whole and a view shows it.
 
     Raises
@@ -103,7 +103,9 @@ def wait_until_loaded(viewer: ViewerClient, within: float = _LOAD) -> ViewerStat
         pause(0.1)
 
 
-def look(viewer: ViewerClient, picture: Path, at: float | None = None, settle: float = _SETTLE) -> Seen:
+def look(
+    viewer: ViewerClient, picture: Path, at: float | None = None, settle: float = _SETTLE_TIME_S
+) -> Seen:
     """Save a picture of what `viewer` shows, at `at` s of the run or where it stands, and say what it is."""
     wait_until_loaded(viewer)
     if at is not None:
@@ -128,7 +130,7 @@ def screenshot(recording: Path, picture: Path, *, at: float | None = None, size:
         Of the window, pixels.
     """
     with headless_viewer(str(recording.resolve(strict=True)), size=size) as viewer:
-        return look(viewer, picture, at, _GREETING_GONE)
+        return look(viewer, picture, at, _GREETING_TIME_S)
 
 
 def main() -> int:

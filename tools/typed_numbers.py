@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.control.parameter_update import Change
 
-_DURATION = 5.0  # s, of a run
+_RUN_DURATION_S = 5.0  # s, of a run
 _KINDS = (
     ("reference.kind=sine",),
     ("reference.kind=chirp",),
@@ -41,11 +41,12 @@ _KINDS = (
 )
 _TABLES = ("loop", "encoder", "amplifier", "model", "observer", "controller", "reference", "supervisor",
            "timing", "run")  # fmt: skip
-_SET = 0.4  # of all numbers are set in a run
-_ENDS, _DECADES = 0.15, 0.5  # of all numbers are ends of a range; up to there, anything in it by decades
-_LARGEST = 1e12  # of a key without a bound
-_SMALLEST = 1e-6
-_BEYOND = 1.001  # times a limit: a sample may be that far on before the trip
+_SET_SHARE = 0.4  # of all numbers are set in a run
+_RANGE_END_SHARE = 0.15  # of all numbers are ends of a range
+_DECADES_SHARE = 0.5  # up to there, anything in the range by decades
+_UNBOUNDED_MAX = 1e12  # of a key without a bound
+_DECADES_MIN = 1e-6
+_LIMIT_RATIO_MAX = 1.001  # times a limit: a sample may be that far on before the trip
 
 
 class Typed(NamedTuple):
@@ -71,16 +72,16 @@ class Outcome(NamedTuple):
     @property
     def bad(self) -> bool:
         """Whether the arm left its limits."""
-        return self.end in ("travel", "speed") or max(self.position, self.speed) > _BEYOND
+        return self.end in ("travel", "speed") or max(self.position, self.speed) > _LIMIT_RATIO_MAX
 
 
 def draw(rng: random.Random) -> Typed:
     """Draw a number: a key of a rig of some kind, and what it may hold."""
     kinds = rng.choice(_KINDS)
     rig = load_rig("bench-1khz", kinds)
-    if rng.random() < _SET:
+    if rng.random() < _SET_SHARE:
         keys = [key for key in settable(rig) if not key.endswith(".kind")]
-        key, at = rng.choice(keys), rng.uniform(0.05, _DURATION - 1.0)
+        key, at = rng.choice(keys), rng.uniform(0.05, _RUN_DURATION_S - 1.0)
     else:
         key, at = rng.choice(list(_numeric(rig))), None
     return Typed(kinds, f"{key}={_number(rig, key, rng)}", at)
@@ -104,16 +105,16 @@ def _number(rig: Rig, key: str, rng: random.Random) -> str:
     whole = "integer" in {one.get("type") for one in (described, *described.get("anyOf", ()))}
     low, high = within_reason(type(section), name)
     low = max(low, merged.get("minimum", low))
-    high = min(high, merged.get("maximum", high), _LARGEST)
-    low = max(low, -_LARGEST)
+    high = min(high, merged.get("maximum", high), _UNBOUNDED_MAX)
+    low = max(low, -_UNBOUNDED_MAX)
     value = getattr(section, name)
     usual = float(value) if isinstance(value, int | float) and value else math.sqrt(_between(low, high))
     way = rng.choice((-1.0, 1.0)) if low < 0.0 else 1.0
     how = rng.random()
-    if how < _ENDS:
+    if how < _RANGE_END_SHARE:
         number = rng.choice((low, high))
-    elif how < _DECADES:
-        number = way * 10.0 ** rng.uniform(math.log10(max(low, _SMALLEST)), math.log10(high))
+    elif how < _DECADES_SHARE:
+        number = way * 10.0 ** rng.uniform(math.log10(max(low, _DECADES_MIN)), math.log10(high))
     else:
         number = way * usual * 10.0 ** rng.gauss(0.0, 0.5)
     number = min(max(number, low), high)
@@ -148,7 +149,7 @@ def judge(typed: Typed) -> Outcome:
         rig = load_rig("bench-1khz", typed.kinds if typed.at is not None else (*typed.kinds, typed.override))
         change = changed(rig, [typed.override])[1] if typed.at is not None else None
         setter = _Setter()
-        session = Session(rig, duration=_DURATION, fast=True, control=setter)
+        session = Session(rig, duration=_RUN_DURATION_S, fast=True, control=setter)
     except ConfigError:
         return nothing
     if change is not None:
@@ -200,8 +201,8 @@ def main() -> int:
         if outcome.bad or (arguments.verbose and not outcome.accepted):
             _say(f"{'BAD ' if outcome.bad else ''}{typed} {outcome}")
     _say(
-        f"{arguments.count} numbers: {bad} arms left their limits, {accepted} ran {_DURATION:g} s; ends: "
-        + ", ".join(f"{end} {n}" for end, n in ends.most_common())
+        f"{arguments.count} numbers: {bad} arms left their limits, {accepted} ran {_RUN_DURATION_S:g} s; "
+        "ends: " + ", ".join(f"{end} {n}" for end, n in ends.most_common())
     )
     return int(bad > 0 or accepted < arguments.count / 3)
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.tools import fake_programmer
 from tools import flash
-from tools.brown_out import OPTCR, OptionError, check_written, level, planned, write_by_probe, writes
+from tools.brown_out import OPTCR_ADDRESS, OptionError, check_written, level, planned, write_by_probe, writes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,7 +40,7 @@ def judged(word: int) -> bool:
         assert word & BOR == 0
         return False
     for write in writes(settings):
-        if write.address == OPTCR:
+        if write.address == OPTCR_ADDRESS:
             assert protection(write.value) == NONE
             assert (write.value ^ word) & ~(BOR | COMMANDS) & 0xFFFF_FFFF == 0
             assert write.value & BOR == 0

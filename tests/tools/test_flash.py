@@ -9,8 +9,8 @@ import pytest
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
 from tools import flash
-from tools.flash import CODE, VECTORS, Piece, commands, record_of
-from tools.record import ADDRESS, SECTOR_BYTES, RecordLink, image, record
+from tools.flash import CODE_ADDRESS, VECTORS_ADDRESS, Piece, commands, record_of
+from tools.record import RECORD_ADDRESS, SECTOR_BYTES, RecordLink, image, record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,13 +97,13 @@ def test_pwm_board_without_its_supply_is_one_line(
 
 def test_record_fills_its_two_sectors_and_no_more() -> None:
     made = image(record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=10.0))
-    assert ADDRESS + len(made) == CODE
+    assert RECORD_ADDRESS + len(made) == CODE_ADDRESS
     assert len(made) == 2 * SECTOR_BYTES
     assert set(made[SECTOR_BYTES:]) == {0xFF}  # older records are gone with it
 
 
 def test_commands_write_every_piece_at_its_address(tmp_path: Path) -> None:
-    pieces = [Piece(tmp_path / "a.bin", CODE), Piece(tmp_path / "b.bin", VECTORS)]
+    pieces = [Piece(tmp_path / "a.bin", CODE_ADDRESS), Piece(tmp_path / "b.bin", VECTORS_ADDRESS)]
     serial = commands("stm32flash", pieces, "/dev/ttyUSB7")
     assert [command[-2:] for command in serial] == [
         ["0x800c000", "/dev/ttyUSB7"], ["0x8000000", "/dev/ttyUSB7"], ["0x8000000", "/dev/ttyUSB7"],

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-_AT_ONCE = 1000  # files a command
+_FILES_PER_COMMAND_MAX = 1000  # files a command
 
 UNREACHED: dict[str, str] = {}
 """Lines of the core, "dcmp_x.c: the line's text", that no input can reach, and why. There is none."""
@@ -51,8 +51,8 @@ def reach(folder: Path, inputs: Sequence[Path]) -> Reach:
         If there is no gcov.
     """
     program = counting_program(folder)
-    for start in range(0, len(inputs), _AT_ONCE):
-        some = [str(path) for path in inputs[start : start + _AT_ONCE]]
+    for start in range(0, len(inputs), _FILES_PER_COMMAND_MAX):
+        some = [str(path) for path in inputs[start : start + _FILES_PER_COMMAND_MAX]]
         subprocess.run([str(program), *some], cwd=folder, check=True, stderr=subprocess.DEVNULL)  # noqa: S603
     lines = branches = all_lines = all_branches = 0
     missing = []

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-LONGEST_INPUT = 96  # bytes: about 17 ticks
+INPUT_BYTES_MAX = 96  # bytes: about 17 ticks
 _STATISTICS = re.compile(
     r"^executions (\d+), ticks (\d+), ticks with frames (\d+), executions in RUN (\d+)$", re.MULTILINE
 )
@@ -70,7 +70,7 @@ def command(program: Path, folder: Path, runs: int, seed: int, seconds: int) -> 
         "runs": runs,
         "seed": seed,
         "max_total_time": seconds,
-        "max_len": LONGEST_INPUT,
+        "max_len": INPUT_BYTES_MAX,
         "len_control": 0,  # long inputs from the start: a state is reached by many operations
         "verbosity": 0,
         "print_final_stats": 1,

@@ -43,12 +43,12 @@ if TYPE_CHECKING:
 
 _FIRST_PORT = 30_000
 _WAITING_ROWS_MAX = 8_000  # a quarter of the ring
-_BATCH_S = 0.1  # of data that is written at once
-_BATCHES_A_MINUTE = round(60.0 / _BATCH_S)
-_TOTAL_EVERY_BATCHES = 200  # 20 s of data between two looks at what all processes take
-_QUIET_S = 0.25  # during which no file grows: free memory is given back five times meanwhile
+_BATCH_DURATION_S = 0.1  # of data that is written at once
+_BATCHES_PER_MINUTE = round(60.0 / _BATCH_DURATION_S)
+_TOTAL_PERIOD_BATCHES = 200  # 20 s of data between two looks at what all processes take
+_QUIET_TIME_S = 0.25  # during which no file grows: free memory is given back five times meanwhile
 _QUIET_TIMEOUT_S = 30.0
-_POLL_S = 0.05
+_POLL_PERIOD_S = 0.05
 
 
 def soak(minutes: float, speed: float, folder: Path, history: str, leak: float = 0.0) -> Soaked:
@@ -82,19 +82,19 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
     pids = {"control side": os.getpid(), "telemetry process": apart.pid, "command process": commands.pid}
     memory, began = Memory(), time.monotonic()
     with _watching(os.getpid()):
-        for batch in range(round(minutes * _BATCHES_A_MINUTE)):
-            late = began + batch * _BATCH_S / speed - time.monotonic()
+        for batch in range(round(minutes * _BATCHES_PER_MINUTE)):
+            late = began + batch * _BATCH_DURATION_S / speed - time.monotonic()
             if late > 0:
                 time.sleep(late)
             while apart.behind > _WAITING_ROWS_MAX and not has_ended(apart.pid):
                 time.sleep(0.005)
-            t = source.write(round(_BATCH_S / rig.period))
+            t = source.write(round(_BATCH_DURATION_S / rig.period))
             for event in events(batch, t):
                 apart.event(event)
-            if batch % _BATCHES_A_MINUTE == _BATCHES_A_MINUTE - 1:
+            if batch % _BATCHES_PER_MINUTE == _BATCHES_PER_MINUTE - 1:
                 _wait_until_quiet(apart, folder)
-                memory.look((batch + 1) / _BATCHES_A_MINUTE, pids, os.getpid())
-            elif batch % _TOTAL_EVERY_BATCHES == 0:
+                memory.look((batch + 1) / _BATCHES_PER_MINUTE, pids, os.getpid())
+            elif batch % _TOTAL_PERIOD_BATCHES == 0:
                 memory.look_at_total(pids)
         wall = time.monotonic() - began
         cpu = {name: cpu_s(pid) for name, pid in pids.items()}
@@ -131,8 +131,8 @@ def _wait_until_quiet(apart: TelemetryProcess, folder: Path) -> None:
     """Wait until the sinks have taken all there is and the files do not grow any more."""
     now = time.monotonic()
     quiet_from, end, sizes = now, now + _QUIET_TIMEOUT_S, [0]
-    while now - quiet_from < _QUIET_S and now < end:
-        time.sleep(_POLL_S)
+    while now - quiet_from < _QUIET_TIME_S and now < end:
+        time.sleep(_POLL_PERIOD_S)
         now, before = time.monotonic(), sizes
         sizes = [file.stat().st_size for file in sorted(folder.iterdir())]
         if apart.behind or sizes != before:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-SETTLING = 5.0
+SETTLING_TIME_MINUTES = 5.0
 """Simulated minutes before memory counts."""
 
 
@@ -35,7 +35,7 @@ class Growth:
         NaN if there are fewer than two.
         """
         x, y = self._floor()
-        x, y = x[x >= SETTLING], y[x >= SETTLING]
+        x, y = x[x >= SETTLING_TIME_MINUTES], y[x >= SETTLING_TIME_MINUTES]
         first, second = np.triu_indices(len(x), 1)
         if not len(first):
             return float("nan")
@@ -47,7 +47,7 @@ class Growth:
         A slope of medians does not see memory that is lost at once, or late.
         """
         x, y = self._floor()
-        x, y = x[x >= SETTLING], y[x >= SETTLING]
+        x, y = x[x >= SETTLING_TIME_MINUTES], y[x >= SETTLING_TIME_MINUTES]
         return (float(y[-1] - y[0]), float(x[-1] - x[0])) if len(x) else (0.0, 0.0)
 
     def _floor(self) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], ...]:

@@ -14,7 +14,7 @@ from dcmp_hil.telemetry import worker
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 
-_POLL_S = 5.0
+_POLL_PERIOD_S = 5.0
 _PROGRAMS = {worker.__name__: "telemetry process", command_server.__name__: "command process"}
 """Module that a child of a run imports, to what it is called."""
 
@@ -26,7 +26,7 @@ def real(minutes: float, folder: Path) -> Soaked:
     memory, cpu, began = Memory(), dict[str, float](), time.monotonic()
     with subprocess.Popen(command, cwd=folder) as process:  # noqa: S603 - our own
         while process.poll() is None:
-            time.sleep(_POLL_S)
+            time.sleep(_POLL_PERIOD_S)
             processes = _processes(process.pid)
             memory.look((time.monotonic() - began) / 60.0, processes, process.pid)
             for name, pid in processes.items():

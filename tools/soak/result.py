@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
     from tools.soak.memory import Memory
 
-SLOPE_MB, TOTAL_MB = 0.2, 500.0
+GROWTH_MAX_MB_PER_MINUTE, TOTAL_MAX_MB = 0.2, 500.0
 """What a process may grow by in a simulated minute, and what all may take."""
-_NOISE_MB = 4.0  # that two minutes may differ by without a leak
+_NOISE_MAX_MB = 4.0  # that two minutes may differ by without a leak
 _LAST_LOOK_MINUTES = 2.0  # before the end, by which every process is still seen
 
 
@@ -55,15 +55,15 @@ class Soaked:
         found = [
             f"{name}: {_grows_by(growth.slope())}"
             for name, growth in self.memory.growth.items()
-            if not growth.slope() < SLOPE_MB
+            if not growth.slope() < GROWTH_MAX_MB_PER_MINUTE
         ]
         for name, growth in self.memory.growth.items():
             rise, minutes = growth.rise()
-            if rise > SLOPE_MB * minutes + _NOISE_MB:
+            if rise > GROWTH_MAX_MB_PER_MINUTE * minutes + _NOISE_MAX_MB:
                 found.append(f"{name}: has {rise:.1f} MB more than {minutes:.0f} simulated minutes before")
             if max(growth.minutes) < self.minutes - _LAST_LOOK_MINUTES:
                 found.append(f"{name}: not seen after minute {max(growth.minutes):.0f}, so it ended early")
-        if not self.memory.peak_mb <= TOTAL_MB:
+        if not self.memory.peak_mb <= TOTAL_MAX_MB:
             found.append(f"all of them take {self.memory.peak_mb:.0f} MB")
         if self.dropped or self.recorded != self.written:
             found.append(f"{self.dropped} periods in no figure, {self.written - self.recorded} not recorded")

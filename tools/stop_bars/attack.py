@@ -17,22 +17,22 @@ from dcmp_hil.live.run_sockets import mailbox_of, running
 from dcmp_hil.live.stop_command import STOP_TIME_MAX_S, is_alive
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.recording.reader import read_run
-from tools.hosts import BOUND_S, wait
-from tools.stop_bars.bars import SIGNALS, STUCK, ZERO_S, Bar
+from tools.hosts import WAIT_TIMEOUT_S, wait
+from tools.stop_bars.bars import SIGNALS, STUCK, ZERO_TIME_MAX_S, Bar
 from tools.stop_bars.run import HostileRun, serve_panel
 
 if TYPE_CHECKING:
     from collections import deque
     from collections.abc import Iterator
 
-_TRIES = 10
+_ATTEMPTS_MAX = 10
 _BUSY = ("device_fault", "SampleTimeoutError", "DeadlineError")  # a computer that is busy ended it first
 
 
 def attack(kind: str, way: str) -> Bar:
     """Start a run with a bad controller, ask for STOP, and look at the device and at what is left."""
     said = ""
-    for _ in range(_TRIES):
+    for _ in range(_ATTEMPTS_MAX):
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stop", dir="/tmp")))
             host = HostileRun(kind, way, folder, stack)
@@ -43,7 +43,7 @@ def attack(kind: str, way: str) -> Bar:
             bar = None if host.process.poll() is not None else _stop(host, kind, way, press)
             if bar is not None and bar.ended_by not in _BUSY:
                 return bar
-    why = f"{_TRIES} runs ended before they were stopped, the last one: {said}"
+    why = f"{_ATTEMPTS_MAX} runs ended before they were stopped, the last one: {said}"
     return Bar(kind, way, 0.0, 0.0, "", "", 0, (why,))
 
 
@@ -61,7 +61,7 @@ def _stop(host: HostileRun, kind: str, way: str, press: Any) -> Bar:
             wait(ended, "the run has ended")
         said, code = answer.result()
         answer_s = 1e-9 * (clock.now_ns() - began_ns)
-    exit_code = host.process.wait(BOUND_S)
+    exit_code = host.process.wait(WAIT_TIMEOUT_S)
     wrong = [*_late(zero_s, answer_s, said, way), *_wrong_answer(code, said, way), *_left(host, kind)]
     summary = _summary(host.folder)
     return Bar(kind, way, zero_s, answer_s, said, str(summary.get("ended_by")), exit_code, tuple(wrong))
@@ -72,7 +72,7 @@ def _ask(host: HostileRun, way: str, press: Any) -> tuple[str, int | None]:
     if way == "stop":
         done = subprocess.run(  # noqa: S603 - our own
             [sys.executable, "-m", "dcmp_hil", "stop", "--run", str(host.pid)],
-            capture_output=True, text=True, timeout=BOUND_S, check=False,
+            capture_output=True, text=True, timeout=WAIT_TIMEOUT_S, check=False,
         )  # fmt: skip
         return (done.stdout + done.stderr).strip(), done.returncode
     if way == "panel":
@@ -93,7 +93,7 @@ def _off_after(log: deque[Any], began_us: int) -> float:
 
 
 def _late(zero_s: float, answer_s: float, said: str, way: str) -> Iterator[str]:
-    if zero_s > ZERO_S:
+    if zero_s > ZERO_TIME_MAX_S:
         yield f"0 V after {zero_s:.2f} s"
     after = re.search(r"after (\d+) ms", said)
     if after and int(after[1]) > 1e3 * STOP_TIME_MAX_S:

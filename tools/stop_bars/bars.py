@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 HOSTILE = Path(__file__).parents[2] / "tests/attacks/hostile/controllers.py"
-ZERO_S = 1.1
+ZERO_TIME_MAX_S = 1.1
 """s, from STOP until the device is at 0 V."""
 SIGNALS = {"SIGINT": signal.SIGINT, "SIGTERM": signal.SIGTERM, "SIGHUP": signal.SIGHUP}
 WAYS = ("stop", "panel", "Ctrl-C", "terminal", *SIGNALS)

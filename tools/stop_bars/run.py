@@ -18,14 +18,14 @@ from dcmp_hil import load_rig
 from dcmp_hil.live.stop_command import is_alive
 from dcmp_hil.platform.clock import MonotonicClock
 from sim_backend.board.virtual_device import VirtualDevice
-from tools.hosts import BOUND_S, wait
+from tools.hosts import WAIT_TIMEOUT_S, wait
 from tools.stop_bars.bars import HOSTILE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_TURNS_S = 0.6  # device time after which a controller turns bad
-_PORTS_TRIED = 5
+_ATTACK_TIME_S = 0.6  # device time after which a controller turns bad
+_PORT_ATTEMPTS_MAX = 5
 _RATE_HZ = 250  # a busy computer is late for fewer periods
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 
@@ -33,7 +33,7 @@ _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 def _page(pid: int) -> tuple[subprocess.Popen[str], str]:
     """Start a page for a run; return its process and its address."""
     said = ""
-    for _ in range(_PORTS_TRIED):  # a port that is free now may be taken before the page binds it
+    for _ in range(_PORT_ATTEMPTS_MAX):  # a port that is free now may be taken before the page binds it
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
@@ -59,7 +59,7 @@ def serve_panel(pid: int) -> Iterator[Any]:
                 urllib.request.HTTPCookieProcessor(http.cookiejar.CookieJar()),
                 urllib.request.ProxyHandler({}),
             )
-            opener.open(address, timeout=BOUND_S).close()
+            opener.open(address, timeout=WAIT_TIMEOUT_S).close()
 
             def press(path: str = "stop") -> str:
                 request = urllib.request.Request(  # noqa: S310 - 127.0.0.1
@@ -67,7 +67,7 @@ def serve_panel(pid: int) -> Iterator[Any]:
                     b'{"changes": []}',
                     {"Origin": origin, "Content-Type": "application/json"},
                 )
-                with opener.open(request, timeout=BOUND_S) as answer:
+                with opener.open(request, timeout=WAIT_TIMEOUT_S) as answer:
                     return str(json.load(answer)["said"])
 
             wait(lambda: "is no run" not in press("set") or not is_alive(pid), "the page found the run")
@@ -85,7 +85,7 @@ class HostileRun:
         self.device = stack.enter_context(VirtualDevice(rig, clock=MonotonicClock()))
         self.device.start()
         shutil.copy(HOSTILE, folder / "hostile.py")
-        turns = round(_TURNS_S * rig.loop.rate_hz)
+        turns = round(_ATTACK_TIME_S * rig.loop.rate_hz)
         sets = [
             f"backend.port={self.device.port}", f"backend.watchdog_ms={_WATCHDOG_MS}",
             f"loop.rate_hz={_RATE_HZ}", "reference.soft_start_s=0.2", "supervisor.error_limit_rad=none",
@@ -121,9 +121,9 @@ class HostileRun:
 
     def turned(self) -> bool:
         """Wait until its controller has turned bad; False if the run ended before."""
-        self._wait_or_end(lambda: self.device.output.state == _RUN)
+        self._wait_or_end(lambda: self.device.output.state == _RUN_STATE)
         began = self.device.tick_count
-        wanted = (_TURNS_S + 0.4) * _RATE_HZ
+        wanted = (_ATTACK_TIME_S + 0.4) * _RATE_HZ
         self._wait_or_end(lambda: self.device.tick_count - began > wanted)
         return self.process.poll() is None
 
@@ -150,10 +150,10 @@ class HostileRun:
     def _end(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
-        self.process.wait(BOUND_S)
+        self.process.wait(WAIT_TIMEOUT_S)
 
 
-_RUN = 3
+_RUN_STATE = 3
 _IN_TERMINAL = """
 import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _ROOT = Path(__file__).resolve().parents[2]
 PAGE = _ROOT / "docs/protocol.md"
 FOLDER = _ROOT / "firmware/proto/traces"
-_OTHER = 7  # fault class of every code from 7 on
+_OTHER_FAULT_CLASS = 7  # fault class of every code from 7 on
 _MARKS = re.compile(r"(<!-- traces: [^\n]*-->\n).*?(<!-- /traces -->)", re.DOTALL)
 
 
@@ -88,7 +88,7 @@ def _cause(steps: list[Step], step: Step) -> str:
     sent = [unpack(read(text)) for one in steps[at:] for text in one.get("sent", ())]
     known = (one.fault_class for one in sent if isinstance(one, SampleReport))
     code = next((code for code in known if code), 0)
-    if code == _OTHER:
+    if code == _OTHER_FAULT_CLASS:
         code = next(one.code for one in sent if isinstance(one, FaultReport))
     return f"({Fault(code).name})"
 

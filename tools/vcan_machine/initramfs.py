@@ -34,7 +34,7 @@ $b poweroff -f
 """
 
 _FOLDERS = ("bin", "dev", "modules", "host", "written", "new")
-_FOLDER, _PROGRAM, _FILE = 0o40755, 0o100755, 0o100644
+_FOLDER_MODE, _PROGRAM_MODE, _FILE_MODE = 0o40755, 0o100755, 0o100644
 
 
 def initramfs(busybox: bytes, modules: Mapping[str, bytes]) -> bytes:
@@ -50,11 +50,11 @@ def initramfs(busybox: bytes, modules: Mapping[str, bytes]) -> bytes:
     names = "".join(f"{name}\n" for name in modules)
     return b"".join(
         (
-            *(_entry(name, _FOLDER) for name in _FOLDERS),
-            _entry("init", _PROGRAM, INIT.encode()),
-            _entry("bin/busybox", _PROGRAM, busybox),
-            _entry("modules/order", _FILE, names.encode()),
-            *(_entry(f"modules/{name}", _FILE, module) for name, module in modules.items()),
+            *(_entry(name, _FOLDER_MODE) for name in _FOLDERS),
+            _entry("init", _PROGRAM_MODE, INIT.encode()),
+            _entry("bin/busybox", _PROGRAM_MODE, busybox),
+            _entry("modules/order", _FILE_MODE, names.encode()),
+            *(_entry(f"modules/{name}", _FILE_MODE, module) for name, module in modules.items()),
             _entry("TRAILER!!!", 0),
         )
     )

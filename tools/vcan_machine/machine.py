@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 QEMU = "qemu-system-x86_64"
 INSTALL = "apt install --no-install-recommends qemu-system-x86 iproute2"
 CONSOLE = "console.txt"  # in the shared folder: what was printed
-_SECONDS = 1200  # wall, on a computer that does much else: nothing may take longer
-_GRACE_S = 5
-_LAST = 2000  # characters of the console that an error shows
+_RUN_TIMEOUT_S = 1200  # wall, on a computer that does much else: nothing may take longer
+_KILL_DELAY_S = 5
+_SHOWN_CONSOLE_CHARS = 2000  # characters of the console that an error shows
 _KEPT = ("PATH", "HOME", "LANG", "XDG_CACHE_HOME", "CC")
 
 # Time in the machine is counted in its instructions, 1 ns each, and stands still while it computes nothing
@@ -110,13 +110,13 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
     try:
         return int((share / STATUS).read_text())
     except (OSError, ValueError):
-        last = (share / CONSOLE).read_text(errors="replace")[-_LAST:]
+        last = (share / CONSOLE).read_text(errors="replace")[-_SHOWN_CONSOLE_CHARS:]
         raise RuntimeError(f"The machine ended before its command did. Its console: {last}") from None
 
 
 def _start(qemu: list[str], console: Path) -> None:
     """Start the machine and wait for its end; if this process is killed meanwhile, `timeout` ends it."""
-    bounded = ["timeout", f"--kill-after={_GRACE_S}", str(_SECONDS), *qemu]
+    bounded = ["timeout", f"--kill-after={_KILL_DELAY_S}", str(_RUN_TIMEOUT_S), *qemu]
     with (
         console.open("wb") as output,
         subprocess.Popen(  # noqa: S603 - our own
