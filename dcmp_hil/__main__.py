@@ -6,12 +6,12 @@ import os
 import signal
 import sys
 
-_INTERRUPTED = 128 + signal.SIGINT
+_INTERRUPTED_EXIT_CODE = 128 + signal.SIGINT  # ExitCode.INTERRUPTED: nothing is imported yet
 
 
 def _leave(*_: object) -> None:
     """Leave: nothing has begun that would have to end, and an exception in an import says nothing."""
-    os._exit(_INTERRUPTED)
+    os._exit(_INTERRUPTED_EXIT_CODE)
 
 
 def main() -> None:

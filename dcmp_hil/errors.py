@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.values import Cycle
+
+
+class ExitCode(IntEnum):
+    """Exit codes of the commands, as docs/cli.md lists them; 128 + n for signal n."""
+
+    OK = 0
+    FAILED = 1
+    CONFIG = 2
+    BACKEND = 3
+    TRIP = 4
+    DEADLINE = 5
+    INCOMPLETE = 6
+    FORCED = 7
+    INTERRUPTED = 130
 
 
 class DcmpError(Exception):
@@ -19,7 +34,7 @@ class DcmpError(Exception):
         Columns, figures and events of the run that it ended; `dcmp_hil.run` fills it in, otherwise None.
     """
 
-    exit_code: ClassVar[int] = 1
+    exit_code: ClassVar[int] = ExitCode.FAILED
     result: Any = None  # a `dcmp_hil.Result`, whose module is above this one
 
 
@@ -32,7 +47,7 @@ class ConfigError(DcmpError):
         One sentence or short paragraph per fault: place, what was got, what was expected, remedy.
     """
 
-    exit_code = 2
+    exit_code: ClassVar[int] = ExitCode.CONFIG
 
     def __init__(self, *faults: str) -> None:
         super().__init__("\n".join(faults))
@@ -42,7 +57,7 @@ class ConfigError(DcmpError):
 class BackendError(DcmpError):
     """The device, or the link to it, failed."""
 
-    exit_code = 3
+    exit_code: ClassVar[int] = ExitCode.BACKEND
 
 
 class OpenError(BackendError):
@@ -82,7 +97,7 @@ class TripError(DcmpError):
         What to look at first.
     """
 
-    exit_code = 4
+    exit_code: ClassVar[int] = ExitCode.TRIP
 
     def __init__(self, reason: str, sentence: str, remedy: str) -> None:
         super().__init__(f"{sentence} {remedy}")
@@ -107,10 +122,10 @@ class TripError(DcmpError):
 class DeadlineError(DcmpError):
     """Deadlines were missed under `timing.overrun = "stop"`, or cannot be promised under "enforce"."""
 
-    exit_code = 5
+    exit_code: ClassVar[int] = ExitCode.DEADLINE
 
 
 class IncompleteError(DcmpError):
     """A recording lacks something, or could not be checked; what is right in it was used."""
 
-    exit_code = 6
+    exit_code: ClassVar[int] = ExitCode.INCOMPLETE

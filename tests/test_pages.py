@@ -1,4 +1,4 @@
-"""What the pages name exists: test files, make targets, and the headings that links lead to."""
+"""What the pages name exists: test files, make targets, exit codes, and the headings that links lead to."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+
+from dcmp_hil.errors import ExitCode
 
 _ROOT = Path(__file__).parents[1]
 _PAGES = sorted([*_ROOT.glob("*.md"), _ROOT / "firmware" / "README.md", *_ROOT.glob("docs/*.md")])
@@ -30,3 +32,11 @@ def test_what_a_page_names_is_there(page: Path) -> None:
         if not other.exists() or (anchor and anchor not in _anchors(other.read_text("utf-8"))):
             missing.append(f"{target}#{anchor}")
     assert not missing
+
+
+def test_page_of_the_commands_lists_every_exit_code() -> None:
+    text = (_ROOT / "docs" / "cli.md").read_text("utf-8")
+    table = text.partition("## Exit codes")[2].partition("\n## ")[0]
+    listed = {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)}
+    assert listed | {ExitCode.INTERRUPTED} == set(ExitCode)
+    assert f"{ExitCode.INTERRUPTED:d}: a second Ctrl-C" in table

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+from dcmp_hil.errors import ExitCode
 from dcmp_hil.platform.clock import MonotonicClock, pause
 from dcmp_hil.wire.messages import State
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 WAIT_TIMEOUT_S = 60.0
 ATTEMPTS_MAX, DOUBT_MAX_US = 10, 500
 _POLL_PERIOD_S = 0.002
-_LATE_EXIT_CODES = (3, 4)  # its samples, or its device's commands, came too late
+_LATE_EXIT_CODES = (ExitCode.BACKEND, ExitCode.TRIP)  # its samples, or its device's commands, came too late
 _DRIVEN_mV = 100
 
 

@@ -14,7 +14,7 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.options import Force, JsonFile
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.conformance.check import Verdict
-from dcmp_hil.errors import BackendError, ConfigError
+from dcmp_hil.errors import BackendError, ConfigError, ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,8 +38,6 @@ _COLOURS = {
     Verdict.NEEDS_ARM: "dim",
     Verdict.OTHER_CARRIER: "dim",
 }
-_FAILED = 1
-_INTERRUPTED = 130
 
 
 class Carrier(StrEnum):
@@ -202,8 +200,8 @@ def _run(
         raise broken
     _sum_up(said, counts, ended_by)
     if ended_by != "finished":
-        return stop.exit_code or _INTERRUPTED
-    return _FAILED if counts[Verdict.FAILED] else 0
+        return stop.exit_code or ExitCode.INTERRUPTED
+    return ExitCode.FAILED if counts[Verdict.FAILED] else ExitCode.OK
 
 
 def _show(said: Console, outcome: Outcome) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,7 +21,7 @@ from dcmp_hil.cli.viewer import chosen
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.control.references.table import Table
-from dcmp_hil.errors import DcmpError, IncompleteError, TripError
+from dcmp_hil.errors import DcmpError, ExitCode, IncompleteError, TripError
 from dcmp_hil.fault_hooks import inject, needs_wire
 from dcmp_hil.platform import process_log
 from dcmp_hil.platform.disk_space import room_for
@@ -144,11 +143,12 @@ def _to_its_end(session: Session) -> _End:
     except TripError as trip:
         return _End(trip.reason, trip, trip.exit_code)
     except KeyboardInterrupt:  # a second Ctrl-C, because something hung; 0 V was driven on the way out
-        return _End("KeyboardInterrupt", None, 128 + signal.SIGINT)
+        return _End("KeyboardInterrupt", None, ExitCode.INTERRUPTED)
     except SystemExit as leaving:  # its code would be that of the run
-        return _End("SystemExit", DcmpError(f"Something in the run called sys.exit: {leaving.code}."), 1)
-    except BaseException as error:  # noqa: BLE001 - raised again as soon as everything is kept
-        return _End(type(error).__name__, error, 1)
+        error = DcmpError(f"Something in the run called sys.exit: {leaving.code}.")
+        return _End("SystemExit", error, ExitCode.FAILED)
+    except BaseException as failure:  # noqa: BLE001 - raised again as soon as everything is kept
+        return _End(type(failure).__name__, failure, ExitCode.FAILED)
     return _End(stop.asked_by or "duration", None, stop.exit_code)
 
 

@@ -9,7 +9,7 @@ import typer
 from rich.text import Text
 
 from dcmp_hil.cli import console
-from dcmp_hil.errors import DcmpError
+from dcmp_hil.errors import DcmpError, ExitCode
 
 if TYPE_CHECKING:
     from dcmp_hil.live.stop_command import Stopped
@@ -57,7 +57,12 @@ def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
         console.out.print(sentence, highlight=False, markup=False)
     else:
         console.err.print(Text.assemble(("error: ", "bold red"), sentence))
-    codes = {End.CONFIRMED: 0, End.UNCONFIRMED: 3, End.FORCED: 7, End.FAILED: 1}
+    codes = {
+        End.CONFIRMED: ExitCode.OK,
+        End.UNCONFIRMED: ExitCode.BACKEND,
+        End.FORCED: ExitCode.FORCED,
+        End.FAILED: ExitCode.FAILED,
+    }
     sys.exit(codes[end])
 
 

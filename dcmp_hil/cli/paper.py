@@ -9,7 +9,7 @@ import typer
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.options import Force, JsonFile
-from dcmp_hil.errors import ConfigError
+from dcmp_hil.errors import ConfigError, ExitCode
 
 
 def paper(
@@ -52,4 +52,4 @@ def paper(
     for sentence in faults:
         console.warn(sentence)
     if not passed:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
