@@ -17,7 +17,7 @@ FIRMWARE = Path(__file__).resolve().parent.parent / "firmware"
 BOARDS = ("bench_f405_dac", "bench_f405_pwm")
 PIECES = ("elf", "bin", "vectors.bin", "code.bin", "map")
 INSTALL = "apt install --no-install-recommends cmake gcc-arm-none-eabi"
-_USE = re.compile(r"^\s*(\w+):\s+(\d+) B\s+(\d+) (KB|MB|B)", re.MULTILINE)
+_MEMORY_USE = re.compile(r"^\s*(\w+):\s+(\d+) B\s+(\d+) (KB|MB|B)", re.MULTILINE)
 
 
 def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
@@ -40,7 +40,10 @@ def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
         said += done.stdout
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
-    uses = [{region: int(used) for region, used, *_ in _USE.findall(part)} for part in said.split("Linking")]
+    uses = [
+        {region: int(used) for region, used, *_ in _MEMORY_USE.findall(part)}
+        for part in said.split("Linking")
+    ]
     linked = re.findall(r"Linking C executable (\w+)\.elf", said)
     return dict(zip(linked, uses[-len(linked) :], strict=True))
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _SPREAD_RATIO_MAX = 2.0  # of C's own p99.9, largest over smallest, beyond which nothing can be judged
 _PRIORITY = 80
-_C = """
+_C_SOURCE = """
 #define _GNU_SOURCE
 #include <sched.h>
 #include <stdint.h>
@@ -143,7 +143,7 @@ def _us(output: bytes) -> NDArray[np.float64]:
 def _compiled() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         source, program = Path(folder) / "sleeper.c", Path(folder) / "sleeper"
-        source.write_text(_C, "utf-8")
+        source.write_text(_C_SOURCE, "utf-8")
         compiler = os.environ.get("CC", "cc")
         subprocess.run([compiler, "-O2", "-o", program, source], check=True)  # noqa: S603 - our own
         yield program

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _TRIPS_PER_ROUND = 300
 _ROUND_COUNT = 15
 _ANSWER_TIMEOUT_S = 1.0
-_ECHO = """
+_ECHO_SOURCE = """
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <poll.h>
@@ -117,7 +117,7 @@ def _echo() -> Iterator[Callable[[], None]]:
     """Send as many bytes through plain pyserial, to a program that sends them back."""
     with tempfile.TemporaryDirectory() as folder:
         source, program = Path(folder) / "echo.c", Path(folder) / "echo"
-        source.write_text(_ECHO, "utf-8")
+        source.write_text(_ECHO_SOURCE, "utf-8")
         compiler = os.environ.get("CC", "cc")
         subprocess.run([compiler, "-O2", "-o", program, source], check=True)  # noqa: S603 - our own
         with subprocess.Popen(  # noqa: S603 - our own

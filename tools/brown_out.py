@@ -23,8 +23,8 @@ LOCK_BIT, START_BIT = 1 << 0, 1 << 1
 COMMANDS = LOCK_BIT | START_BIT
 RESERVED_BITS = 0xF000_0010  # 0 in every STM32F405
 BOR_LEV_BITS = 0b11 << 2  # 0b11: off, 0b10: level 1, 0b01: level 2, 0b00: level 3
-_RDP_AT, _RDP_NONE, _RDP_FOR_EVER = 8, 0xAA, 0xCC
-_NAMES = {0b11: "off", 0b10: "level 1", 0b01: "level 2", 0b00: "level 3"}
+_RDP_SHIFT_BITS, _RDP_NONE, _RDP_LOCKED = 8, 0xAA, 0xCC
+_LEVEL_NAMES = {0b11: "off", 0b10: "level 1", 0b01: "level 2", 0b00: "level 3"}
 
 DHCSR_ADDRESS, HALTED_BIT = 0xE000_EDF0, 1 << 17  # of the processor's debug unit
 FREEZE_ADDRESS, FREEZE_IWDG_BIT = 0xE004_2008, 1 << 12  # the watchdog stands still with the processor
@@ -45,12 +45,12 @@ class Write(NamedTuple):
 
 def is_open(word: int) -> bool:
     """Return whether a word that was read is that of a chip without read protection."""
-    return word >> _RDP_AT & 0xFF == _RDP_NONE
+    return word >> _RDP_SHIFT_BITS & 0xFF == _RDP_NONE
 
 
 def level(word: int) -> str:
     """Return the name of an option word's brown-out level."""
-    return _NAMES[(word & BOR_LEV_BITS) >> 2]
+    return _LEVEL_NAMES[(word & BOR_LEV_BITS) >> 2]
 
 
 def planned(word: int) -> int | None:
@@ -64,8 +64,8 @@ def planned(word: int) -> int | None:
         If the chip is protected against reading, the word cannot be that of an STM32F405, or a write was
         begun and not ended: then the register holds what was to be written, and not what the chip will do.
     """
-    protection = word >> _RDP_AT & 0xFF
-    if protection == _RDP_FOR_EVER:
+    protection = word >> _RDP_SHIFT_BITS & 0xFF
+    if protection == _RDP_LOCKED:
         raise OptionError(
             f"option word {word:#010x}: the chip is locked for ever (RDP level 2). Nothing was written; use "
             "another chip."

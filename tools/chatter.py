@@ -209,17 +209,20 @@ _OVERRIDES: Mapping[str, Sequence[str]] = {
     **{f"{rate} Hz": (f"loop.rate_hz={rate}",) for rate in (250, 5000)},
     **{f"encoder noise {noise} counts": (f"sim.encoder_noise_counts={noise}",) for noise in (0.3, 1.0)},
 }
-_IMMEDIATE = ("supervisor.start=immediate", "sim.position_rad=-1.57")
+_IMMEDIATE_START_OVERRIDES = ("supervisor.start=immediate", "sim.position_rad=-1.57")
 
 
 def hard_cases() -> Iterator[tuple[str, Rig]]:
     """Yield the acceptance rows of the friction observer that this loop can run, by name."""
     for name, overrides in _OVERRIDES.items():
-        yield name, load_rig("bench-1khz", [*_IMMEDIATE, *overrides])
+        yield name, load_rig("bench-1khz", [*_IMMEDIATE_START_OVERRIDES, *overrides])
     for number, (name, what) in enumerate(_CASES.items()):
         made = {key: staticmethod(value) if callable(value) else value for key, value in what.items()}
         globals()[f"Case{number}"] = type(f"Case{number}", (Case,), made)
-        yield name, load_rig("bench-1khz", [*_IMMEDIATE, f"backend.kind={__name__}:Case{number}"])
+        yield (
+            name,
+            load_rig("bench-1khz", [*_IMMEDIATE_START_OVERRIDES, f"backend.kind={__name__}:Case{number}"]),
+        )
     with TemporaryDirectory() as folder:
         file = Path(folder) / "two_sines.csv"
         rows = (
@@ -229,7 +232,9 @@ def hard_cases() -> Iterator[tuple[str, Rig]]:
         file.write_text("\n".join(("time_s,position_rad", *rows)), "utf-8")
         yield (
             "two sines",
-            load_rig("bench-1khz", [*_IMMEDIATE, "reference.kind=csv", f"reference.file={file}"]),
+            load_rig(
+                "bench-1khz", [*_IMMEDIATE_START_OVERRIDES, "reference.kind=csv", f"reference.file={file}"]
+            ),
         )
 
 

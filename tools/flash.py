@@ -32,7 +32,7 @@ INSTALL = {
     "stm32flash": "apt install --no-install-recommends stm32flash",
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
-_TALK = ["stm32flash", "-b", "115200"]  # to the boot loader
+_STM32FLASH_COMMAND = ["stm32flash", "-b", "115200"]  # to the boot loader
 _DAC_FULL_SCALE_V = 10.0  # V, full scale unless it is said
 _SUPPLY_RANGE_V = (1.0, 100.0)  # V
 _BOARD_NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
@@ -118,8 +118,11 @@ def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
     if by == "pyocd":
         to = ["--target", "stm32f405rg", "--format", "bin", "--base-address"]
         return [["pyocd", "flash", *to, f"{piece.address:#x}", str(piece.file)] for piece in pieces]
-    writes = [[*_TALK, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port] for piece in pieces]
-    return [*writes, [*_TALK, "-g", f"{VECTORS_ADDRESS:#x}", port]]
+    writes = [
+        [*_STM32FLASH_COMMAND, "-w", str(piece.file), "-v", "-S", f"{piece.address:#x}", port]
+        for piece in pieces
+    ]
+    return [*writes, [*_STM32FLASH_COMMAND, "-g", f"{VECTORS_ADDRESS:#x}", port]]
 
 
 def _arguments() -> argparse.Namespace:
@@ -239,7 +242,9 @@ def _brown_out(asked: argparse.Namespace, file: Path) -> None:
     """Set the level where a probe may; look at it where only a part is flashed, or by the boot loader."""
     by_probe = asked.by == "pyocd"
     read = (
-        brown_out.read_by_probe(file) if by_probe else brown_out.read_by_boot_loader(file, _TALK, asked.port)
+        brown_out.read_by_probe(file)
+        if by_probe
+        else brown_out.read_by_boot_loader(file, _STM32FLASH_COMMAND, asked.port)
     )
     if asked.dry_run:
         _do(read, dry_run=True)

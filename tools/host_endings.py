@@ -28,7 +28,7 @@ OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 _RAISE_TIME_S = 1.2  # s, device time at which a host's own part raises
 
-_PART = f'''
+_PLUGIN_SOURCE = f'''
 import time
 from pathlib import Path
 
@@ -152,7 +152,7 @@ def end(name: str) -> Ending:
             VirtualDevice(load_rig("bench-1khz"), clock=MonotonicClock()) as device,
         ):
             folder = Path(place)
-            (folder / "goes_wrong.py").write_text(_PART)
+            (folder / "goes_wrong.py").write_text(_PLUGIN_SOURCE)
             device.start()
             host = _start(device.port, WAYS[name], folder)
             try:

@@ -33,13 +33,13 @@ DBC = _ROOT / "firmware/proto/dcmp.dbc"
 PAGE = _ROOT / "docs/protocol.md"
 PYTHON = _ROOT / "dcmp_hil/wire/protocol_hash.py"
 HEADER = _ROOT / "firmware/core/dcmp_protocol_hash.h"
-_MEANT = ("BO_ ", "SG_ ", "VAL_ ")
+_MEANT_PREFIXES = ("BO_ ", "SG_ ", "VAL_ ")
 
 
 def protocol_hash(text: str) -> int:
     """Return the hash of a DBC's meaning: its comments and blank lines do not count."""
     lines = (line.strip() for line in text.splitlines())
-    meant = "".join(f"{line}\n" for line in lines if line.startswith(_MEANT))
+    meant = "".join(f"{line}\n" for line in lines if line.startswith(_MEANT_PREFIXES))
     return int.from_bytes(hashlib.sha256(meant.encode()).digest()[:4], "big")
 
 

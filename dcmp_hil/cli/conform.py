@@ -31,7 +31,7 @@ WHAT_MOVES = (
     "Keep clear of the arm, "
     "let it hang freely, limit the supply, have the e-stop within reach."
 )
-_COLOURS = {
+_VERDICT_COLOURS = {
     Verdict.PASSED: "green",
     Verdict.FAILED: "bold red",
     Verdict.NOT_JUDGED: "yellow",
@@ -209,7 +209,9 @@ def _show(said: Console, outcome: Outcome) -> None:
     if verdict == Verdict.OTHER_CARRIER:
         return
     said.print(
-        Text.assemble((f"{verdict.value:11}", _COLOURS[verdict]), f" {check.name} (section {check.section})")
+        Text.assemble(
+            (f"{verdict.value:11}", _VERDICT_COLOURS[verdict]), f" {check.name} (section {check.section})"
+        )
     )
     if verdict == Verdict.FAILED:
         said.print(Text(f"            the page: {check.says}"))

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.platform.stop_request import StopRequest
 
-_DEVICE = "sim_backend.board.virtual_device:VirtualDevice"
+_DEVICE_CLASS = "sim_backend.board.virtual_device:VirtualDevice"
 _STATUS_PERIOD_S = 0.1  # between two looks at Ctrl-C, and two status lines
-_RIG = "bench-1khz"
+_RIG_NAME = "bench-1khz"
 _RUN_WITH = {
     "cobs": ("backend.kind=serial", "backend.port={port}"),
     "slcan": ("backend.kind=can", "backend.interface=slcan", "backend.channel={port}"),
@@ -37,7 +37,7 @@ class LinkName(StrEnum):
 
 
 def device(
-    rig: RigName = _RIG,
+    rig: RigName = _RIG_NAME,
     overrides: Overrides = None,
     link: Annotated[LinkName, typer.Option(help="Carrier of the frames on the port.")] = LinkName.COBS,
     symlink: Annotated[
@@ -56,7 +56,7 @@ def device(
     from dcmp_hil.plugins import find_named
 
     loaded = load_rig(rig, overrides or ())
-    make = find_named(_DEVICE, "device")
+    make = find_named(_DEVICE_CLASS, "device")
     with (
         StopRequest() as stop,
         make(loaded, link=link.value, clock=MonotonicClock(), symlink=symlink) as running,
@@ -71,7 +71,7 @@ def device(
 
 
 def _run_command(rig: str, overrides: list[str]) -> list[str]:
-    named = [] if rig == _RIG else [rig]
+    named = [] if rig == _RIG_NAME else [rig]
     return ["dcmp-hil", "run", *named, *(part for key in overrides for part in ("--set", key))]
 
 

@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.telemetry.sink_factories import SinkMaker
 
-INCOMPLETE = "recording_incomplete"
+INCOMPLETE_ENDED_BY = "recording_incomplete"
 """How a run ended that went well, and is not wholly in its recording."""
-_BOARD = "backend.kind=sim-board"
+_BOARD_OVERRIDE = "backend.kind=sim-board"
 _PICTURE_DURATION_MAX_S = 600.0  # s: a longer run is not kept in memory for a picture
 
 
@@ -74,8 +74,10 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     for sentence in warnings(rig):
         console.warn(sentence)
     if rig.backend.kind == "sim" and needs_wire(options.faults):
-        console.warn(f"backend.kind = sim has no wire, and a fault needs one: this run has {_BOARD}.")
-        rig = load_rig(rig_name, [*overrides, _BOARD])
+        console.warn(
+            f"backend.kind = sim has no wire, and a fault needs one: this run has {_BOARD_OVERRIDE}."
+        )
+        rig = load_rig(rig_name, [*overrides, _BOARD_OVERRIDE])
     faults = inject(rig, options.faults, "--fault")
     # From here on stops are heard: opening a viewer takes its time, too.
     with StopRequest() as stop:
@@ -87,7 +89,7 @@ def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
     folder = RunFolder(rig.name) if options.keep else None
     began, incomplete = False, ""
     try:
-        with split_stderr(folder.path / process_log.FILE if folder else None):
+        with split_stderr(folder.path / process_log.LOG_FILE_NAME if folder else None):
             session = _session(rig, faults, options, folder, stop)
             end = _to_its_end(session)
             began = session.began
@@ -195,7 +197,7 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
         kept = kept_in(folder.own, result.periods, wait=not cut_off) if folder else None
         ended_by = end.ended_by
         if kept is not None and not kept.complete and end.error is None and end.code == 0:
-            ended_by = INCOMPLETE
+            ended_by = INCOMPLETE_ENDED_BY
         document = run_document(session.rig, options.note, options.faults, result, ended_by, kept)
         missing = folder.write(session.rig, document, end.error) if folder else []
         incomplete = kept.why if kept is not None and kept.why else "".join(missing[:1])

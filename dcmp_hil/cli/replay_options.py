@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
 IDEAL = "ideal"
-_KEYS = {  # short options for keys of a rig
+_OPTION_KEYS = {  # short options for keys of a rig
     "observer": "observer.kind",
     "mu0": "observer.mu0_rad_s",
     "M": "observer.M_rad_s3",
@@ -70,12 +70,15 @@ class Given:
             If one key is given twice.
         """
         gains = {**self.gains, "observer": _kind(self.gains.get("observer"))}
-        short = tuple(f"{_KEYS[name]}={_toml(value)}" for name, value in _set(gains).items())
+        short = tuple(f"{_OPTION_KEYS[name]}={_toml(value)}" for name, value in _set(gains).items())
         keys = [override.partition("=")[0].strip() for override in self.overrides]
-        twice = [option for option, key in _KEYS.items() if key in keys and option in _set(self.gains)]
+        twice = [option for option, key in _OPTION_KEYS.items() if key in keys and option in _set(self.gains)]
         if twice:
             raise ConfigError(
-                *(f"--{option} and --set {_KEYS[option]} say the same. Leave one out." for option in twice)
+                *(
+                    f"--{option} and --set {_OPTION_KEYS[option]} say the same. Leave one out."
+                    for option in twice
+                )
             )
         return short + self.overrides
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 
-_RUNS = Path("runs")
+_RUNS_FOLDER = Path("runs")
 
 
 class RunFolder:
@@ -39,19 +39,19 @@ class RunFolder:
     """
 
     def __init__(self, rig_name: str) -> None:
-        self._made_parent = not _RUNS.exists()
-        if _RUNS.is_symlink() and self._made_parent:
+        self._made_parent = not _RUNS_FOLDER.exists()
+        if _RUNS_FOLDER.is_symlink() and self._made_parent:
             raise ConfigError(
-                f"{_RUNS} is a link to {_RUNS.readlink()}, which is not there. Make that folder, remove the "
-                "link, or use --no-record."
+                f"{_RUNS_FOLDER} is a link to {_RUNS_FOLDER.readlink()}, which is not there. Make that "
+                "folder, remove the link, or use --no-record."
             )
-        if not self._made_parent and not _RUNS.is_dir():
+        if not self._made_parent and not _RUNS_FOLDER.is_dir():
             raise ConfigError(
-                f"{_RUNS} is no folder. Call it something else, start elsewhere, or use --no-record."
+                f"{_RUNS_FOLDER} is no folder. Call it something else, start elsewhere, or use --no-record."
             )
         stem = f"{utc_now():%Y%m%dT%H%M%SZ}-{rig_name}"
         for suffix in ("", *(f"-{n}" for n in range(2, 100))):
-            self.path = _RUNS / f"{stem}{suffix}"
+            self.path = _RUNS_FOLDER / f"{stem}{suffix}"
             try:
                 self.path.mkdir(parents=True)
             except FileExistsError:
@@ -62,7 +62,7 @@ class RunFolder:
                     "Start from a folder you may write in, or use --no-record."
                 ) from None
             return
-        raise ConfigError(f"{_RUNS / stem}: 99 runs began in this second. Wait a moment.")
+        raise ConfigError(f"{_RUNS_FOLDER / stem}: 99 runs began in this second. Wait a moment.")
 
     @property
     def recording(self) -> Path:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
-_WARNING = "yellow"
+_WARNING_STYLE = "yellow"
 
 
 class StatusLine:
@@ -54,7 +54,7 @@ class StatusLine:
         if isinstance(event.data, PhaseData):
             self._phase = event.data.phase
         elif event.level == "WARN":
-            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING))
+            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING_STYLE))
 
     def close(self) -> None:
         """Remove the status line; the summary follows."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 _STDIN_FILENO, _STDOUT_FILENO, _STDERR_FILENO = 0, 1, 2
-_ERRORS = "dcmp_hil.substitute"
+_ERROR_HANDLER = "dcmp_hil.substitute"
 _SUBSTITUTES = str.maketrans(
     "µ²\N{EN DASH}→≤≥\N{MULTIPLICATION SIGN}…─│╭╮╰╯┌┐└┘├┤━┃▁▂▃▄▅▆▇█",
     "u2-><>x.-|++++++++++-|._-=+*%#",
@@ -66,7 +66,7 @@ def guard() -> None:
     Characters that an encoding lacks are replaced by similar ones, or by a question mark. Descriptors that
     the caller closed lead to the null device: the next file that is opened would else take their place.
     """
-    codecs.register_error(_ERRORS, _substitute)
+    codecs.register_error(_ERROR_HANDLER, _substitute)
     for number in (_STDIN_FILENO, _STDOUT_FILENO, _STDERR_FILENO):
         try:
             os.fstat(number)
@@ -101,7 +101,7 @@ def _guarded(stream: TextIO | None, number: int) -> TextIO:
 
 def _text(number: int, encoding: str, *, line_buffering: bool, replaced: TextIO | None = None) -> TextIO:
     binary = io.BufferedWriter(_Descriptor(number, replaced))
-    return io.TextIOWrapper(binary, encoding=encoding, errors=_ERRORS, line_buffering=line_buffering)
+    return io.TextIOWrapper(binary, encoding=encoding, errors=_ERROR_HANDLER, line_buffering=line_buffering)
 
 
 def _raw(stream: TextIO) -> object:

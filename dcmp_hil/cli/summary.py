@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.result import Result
     from dcmp_hil.telemetry.statistics import DurationHistogram
 
-_BARS = " ▁▂▃▄▅▆▇█"
+_BAR_CHARS = " ▁▂▃▄▅▆▇█"
 
 
 def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
@@ -118,7 +118,7 @@ def _bars(histogram: DurationHistogram) -> str:
     if not histogram.counts:
         return ""
     most = math.log1p(max(histogram.counts))
-    bars = "".join(_BARS[math.ceil(8 * math.log1p(count) / most)] for count in histogram.counts)
+    bars = "".join(_BAR_CHARS[math.ceil(8 * math.log1p(count) / most)] for count in histogram.counts)
     return f"≤{histogram.up_to_us[0]:g} {bars} ≤{histogram.up_to_us[-1]:g}"
 
 

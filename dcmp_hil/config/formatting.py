@@ -11,7 +11,12 @@ if TYPE_CHECKING:
 _SHOWN_CHARS_MAX = 60  # characters of a key or a value that are shown
 _PLAIN_NUMBER_MAX = 1e15  # beyond it a float no longer holds every whole number
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-_TYPES = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}
+_TYPE_NAMES = {
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "text",
+}
 
 
 def number(value: float) -> str:
@@ -60,7 +65,7 @@ def describe(schema: Mapping[str, Any]) -> str:
         return "0 or 1"
     examples = schema.get("examples")
     such_as = f" such as {toml_value(examples[0])}" if examples else ""
-    return f"{_TYPES.get(str(schema.get('type')), 'a table')}{_bounds(schema)}{such_as}"
+    return f"{_TYPE_NAMES.get(str(schema.get('type')), 'a table')}{_bounds(schema)}{such_as}"
 
 
 def _bounds(schema: Mapping[str, Any]) -> str:

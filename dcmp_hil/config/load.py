@@ -21,7 +21,7 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-_FOLDER = resources.files("dcmp_hil").joinpath("rigs")
+_RIGS_FOLDER = resources.files("dcmp_hil").joinpath("rigs")
 _FILE_BYTES_MAX = 128 * 1024  # bytes: no rig is that long
 _LINE_CHARS_MAX = 4096  # characters: the time for a dotted key grows with the square of its length
 
@@ -29,7 +29,7 @@ _LINE_CHARS_MAX = 4096  # characters: the time for a dotted key grows with the s
 def shipped_rigs() -> list[str]:
     """Return the names of the rigs that come with the package."""
     return sorted(
-        entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml")
+        entry.name.removesuffix(".toml") for entry in _RIGS_FOLDER.iterdir() if entry.name.endswith(".toml")
     )
 
 
@@ -121,7 +121,7 @@ def copy_rig(name: str, target: Path) -> list[Path]:
             file.write(text)
         if not schema.exists():
             written.append(schema)
-            schema.write_text(_FOLDER.joinpath(schema.name).read_text("utf-8"), "utf-8")
+            schema.write_text(_RIGS_FOLDER.joinpath(schema.name).read_text("utf-8"), "utf-8")
     except FileExistsError:
         raise ConfigError(f"{target}: exists already. Choose another name, or remove it first.") from None
     except FileNotFoundError:
@@ -178,7 +178,7 @@ def shipped_text(name: str) -> str:
             f"{toml_value(name)} is no shipped rig. {hint}There are: {', '.join(known)}; "
             "a file of your own ends in .toml."
         )
-    return _FOLDER.joinpath(f"{name}.toml").read_text("utf-8")
+    return _RIGS_FOLDER.joinpath(f"{name}.toml").read_text("utf-8")
 
 
 def _with_reference_file(rig: Rig, folder: Path, place: str, set_keys: Collection[str]) -> Rig:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel
 
-_PERIODS = ("period", "dt", "sample_time", "cycle_time")
-_NUMBER = re.compile(r"\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_PERIOD_NAMES = ("period", "dt", "sample_time", "cycle_time")
+_NUMBER_WITH_UNIT = re.compile(r"\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
 def for_unknown_key(path: tuple[str, ...], value: Any, model: type[BaseModel]) -> str:
@@ -64,7 +64,7 @@ def for_text(key: str, text: str, schema: Mapping[str, Any]) -> str:
 def _quoted_number(key: str, text: str) -> str:
     """Show how to write a number that came in quotes, perhaps with its unit, perhaps with another one."""
     unit = split_unit(key)[1]
-    found = _NUMBER.fullmatch(text)
+    found = _NUMBER_WITH_UNIT.fullmatch(text)
     got = _number_in(found[1]) if found else None
     if found and got is not None and found[2]:
         scale = factor(unit_named(found[2]), unit)
@@ -87,7 +87,7 @@ def _other_unit(key: str, value: Any, known: list[str]) -> str:
     stem, unit = split_unit(key)
     got = _as_float(value)
     seconds = factor(unit, "s")
-    if stem in _PERIODS and "rate_hz" in known and (not unit or seconds is not None):
+    if stem in _PERIOD_NAMES and "rate_hz" in known and (not unit or seconds is not None):
         period = got * (seconds or math.nan)
         return f"The rate is given instead: rate_hz{f' = {1 / period:.9g}' if period > 0 else ''}."
     for other in known:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-_FAMILIES: tuple[dict[str, float], ...] = (
+_UNIT_FAMILIES: tuple[dict[str, float], ...] = (
     {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3},
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     {"hz": 1.0, "khz": 1e3},
@@ -18,8 +18,8 @@ _FAMILIES: tuple[dict[str, float], ...] = (
     {"rad_s2_V": 1.0},
     {"counts": 1.0},
 )
-_UNITS = sorted({unit for family in _FAMILIES for unit in family}, key=len, reverse=True)
-_WORDS = {"rad_s2_V": "(rad/s2)/V", "hz": "Hz", "khz": "kHz"}
+_UNITS = sorted({unit for family in _UNIT_FAMILIES for unit in family}, key=len, reverse=True)
+_UNIT_SPELLINGS = {"rad_s2_V": "(rad/s2)/V", "hz": "Hz", "khz": "kHz"}
 _BY_LOWER = {unit.lower(): unit for unit in _UNITS}
 
 
@@ -33,7 +33,7 @@ def split_unit(key: str) -> tuple[str, str]:
 
 def factor(unit: str, wanted: str) -> float | None:
     """Return what to multiply a value in `unit` with to have it in `wanted`; None if they do not compare."""
-    for family in _FAMILIES:
+    for family in _UNIT_FAMILIES:
         if unit in family and wanted in family:
             return family[unit] / family[wanted]
     return None
@@ -46,4 +46,4 @@ def unit_named(text: str) -> str:
 
 def in_words(unit: str) -> str:
     """Return the unit of a key in its usual spelling, such as rad/s."""
-    return _WORDS.get(unit) or unit.replace("_", "/")
+    return _UNIT_SPELLINGS.get(unit) or unit.replace("_", "/")

@@ -11,9 +11,9 @@ from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterResult, Par
 if TYPE_CHECKING:
     from dcmp_hil.device.client import DeviceClient
 
-_CAUSES = ("unknown", "power", "reset pin", "software", "watchdog", "brown-out")
+_RESET_CAUSES = ("unknown", "power", "reset pin", "software", "watchdog", "brown-out")
 _WATCHDOG_CAUSE, _BROWN_OUT_CAUSE = 4, 5
-_REMEDIES = {
+_RESET_REMEDIES = {
     _WATCHDOG_CAUSE: "Its processor hung: look at what its firmware did last.",
     _BROWN_OUT_CAUSE: "Its supply fell too low: look at the supply of its logic under load.",
 }
@@ -40,8 +40,8 @@ class History(NamedTuple):
     def remarks(self) -> tuple[str, ...]:
         """Points that a person should check before the motor runs."""
         found = []
-        if self.cause in _REMEDIES:
-            found.append(f"The device was reset by its {self._cause}. {_REMEDIES[self.cause]}")
+        if self.cause in _RESET_REMEDIES:
+            found.append(f"The device was reset by its {self._cause}. {_RESET_REMEDIES[self.cause]}")
         if self.fault in {Fault.BREAK_INPUT, Fault.INTERNAL}:
             meaning = meaning_of(self.fault)
             found.append(
@@ -54,7 +54,7 @@ class History(NamedTuple):
     def _cause(self) -> str:
         if self.cause is None:
             return "not told"
-        return _CAUSES[self.cause] if 0 <= self.cause < len(_CAUSES) else f"cause {self.cause}"
+        return _RESET_CAUSES[self.cause] if 0 <= self.cause < len(_RESET_CAUSES) else f"cause {self.cause}"
 
 
 def history_of(client: DeviceClient) -> History:

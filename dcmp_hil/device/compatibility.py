@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.device.device_config import DeviceConfig
 
 _INT32_MAX = 2**31 - 1
-RANGES = {
+PARAMETER_RANGES = {
     Parameter.BOARD: (0, _INT32_MAX),
     Parameter.BOOT_COUNT: (0, _INT32_MAX),
     Parameter.RESET_CAUSE: (0, _INT32_MAX),
@@ -32,7 +32,7 @@ RANGES = {
     Parameter.TRAVEL_ORIGIN_COUNTS: (-1, 2**24 - 1),
 }
 """What a value can be at all, both ends included."""
-COMPARED = (
+COMPARED_PARAMETERS = (
     Parameter.COUNTS_PER_REV,
     Parameter.PERIOD_US,
     Parameter.VOLTAGE_LIMIT_MV,
@@ -45,7 +45,7 @@ COMPARED = (
 
 def is_possible(parameter: Parameter, value: int) -> bool:
     """Whether a parameter can have that value on any device."""
-    lowest, highest = RANGES[parameter]
+    lowest, highest = PARAMETER_RANGES[parameter]
     return lowest <= value <= highest
 
 
@@ -57,7 +57,7 @@ def differences(config: DeviceConfig, device: Mapping[Parameter, int]) -> list[s
     config
         What the rig says.
     device
-        The values of COMPARED, all of them possible.
+        The values of COMPARED_PARAMETERS, all of them possible.
     """
     return [sentence for sentence in (*_same(config, device), *_limits(config, device)) if sentence]
 

@@ -29,7 +29,7 @@ _TWO_DEVICES_LISTEN_S = 1.0  # s, longer where ticks are odd
 _TICK_MODULUS = 256
 _OTHER_FAULT_CLASS = 7  # fault class of every code from 7 on
 _NO_SESSION = 0  # the session of a HELLO that owns nothing
-_DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
+_CAN_DRIVERS = ("socketcan", "pcan", "kvaser", "vector", "ixxat", "gs_usb")
 _KEYS_ALWAYS_SHOWN = ("kind", "port", "interface", "channel")  # that a command names always
 _KEYS_WITH_DEFAULT = ("node", "baud", "bitrate")  # that it names where they are not the default
 
@@ -127,7 +127,7 @@ def _can_channels() -> Iterator[tuple[str, str]]:
     logging.disable(logging.ERROR)  # every driver that is not installed says so
     configs: list[Any] = []
     try:
-        for driver in _DRIVERS:
+        for driver in _CAN_DRIVERS:
             with contextlib.suppress(Exception):  # drivers raise exceptions of any type
                 configs.extend(can.detect_available_configs(interfaces=driver))
     finally:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.messages import ParameterValue
 
 _ADAPTER_WAIT_MAX_S = 0.035  # two waits of an adapter's 16 ms, at most
-_FIRMWARE = "Flash the firmware that comes with this version of dcmp-hil"
+_FIRMWARE_REMEDY = "Flash the firmware that comes with this version of dcmp-hil"
 
 
 class NoAnswerError(OpenError):
@@ -83,7 +83,7 @@ def other_protocol(name: str, firmware: str, protocol: int) -> OpenError:
     """Make the error for two sides that do not speak the same."""
     return OpenError(
         f"{name}: firmware {firmware} speaks protocol {protocol:08x}, this host {PROTOCOL_HASH:08x}. "
-        f"{_FIRMWARE}, or install the dcmp-hil that the firmware came with."
+        f"{_FIRMWARE_REMEDY}, or install the dcmp-hil that the firmware came with."
     )
 
 
@@ -141,8 +141,8 @@ def other_fault(name: str, first: str, second: str) -> OpenError:
 def impossible(name: str, what: str) -> OpenError:
     """Make the error for an answer that no device can mean."""
     return OpenError(
-        f"{name}: the device says {what}, which cannot be. It is not used. {_FIRMWARE}, or mend the device's "
-        "own; `dcmp-hil monitor` shows what it sends."
+        f"{name}: the device says {what}, which cannot be. It is not used. {_FIRMWARE_REMEDY}, or mend "
+        "the device's own; `dcmp-hil monitor` shows what it sends."
     )
 
 
@@ -158,7 +158,7 @@ def no_samples(name: str, seconds: float, heard: str) -> OpenError:
     """Make the error for a device that sends all but samples."""
     return OpenError(
         f"{name}: {heard} arrives, but no SAMPLE within {seconds:g} s. The line is right; the device's "
-        f"periodic tick does not run, or its samples find no room. {_FIRMWARE}."
+        f"periodic tick does not run, or its samples find no room. {_FIRMWARE_REMEDY}."
     )
 
 
@@ -185,7 +185,7 @@ def _result(result: int) -> str:
 
 def not_told(name: str, parameter: str) -> NoAnswerError:
     """Make the error for a parameter that is not there."""
-    return NoAnswerError(f"{name}: the device does not say its {parameter}. {_FIRMWARE}.")
+    return NoAnswerError(f"{name}: the device does not say its {parameter}. {_FIRMWARE_REMEDY}.")
 
 
 def not_armed(name: str, state: str, seconds: float) -> NoAnswerError:

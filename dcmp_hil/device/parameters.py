@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.device import open_errors
 from dcmp_hil.device.client import ANSWER_TIMEOUT_S
-from dcmp_hil.device.compatibility import COMPARED, is_possible
+from dcmp_hil.device.compatibility import COMPARED_PARAMETERS, is_possible
 from dcmp_hil.wire.messages import Parameter, ParameterGet, ParameterResult, ParameterSet, ParameterValue
 from dcmp_hil.wire.wrapping import unwrap
 
@@ -53,7 +53,7 @@ class DeviceParameters:
 
     def compared(self) -> dict[Parameter, int]:
         """Return the device's parameters that are compared with the rig."""
-        return {parameter: self.get(parameter) for parameter in COMPARED}
+        return {parameter: self.get(parameter) for parameter in COMPARED_PARAMETERS}
 
     def put_limits(self, config: DeviceConfig, built: Mapping[Parameter, int]) -> int:
         """Lower the device's limits to the rig's, and read back that it keeps them.

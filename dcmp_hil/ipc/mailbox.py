@@ -32,7 +32,7 @@ _HEADER_WORDS = 16  # of 8 bytes
     _END,
 ) = range(12)
 _TIME = struct.Struct("d")
-_TIME_AT, _END_TEXT_AT, _SLOT_AT = 8 * _HEADER_WORDS, 256, 4096
+_TIME_OFFSET_BYTES, _END_TEXT_OFFSET_BYTES, _SLOT_OFFSET_BYTES = 8 * _HEADER_WORDS, 256, 4096
 BELL_WORD = _BELL
 """Place of the number that tells the loop to look at the others."""
 MAILBOX_BYTES = 1 << 16
@@ -84,9 +84,9 @@ class Mailbox:
             If it is too long for the slot.
         """
         data = pickle.dumps(change)
-        if len(data) > MAILBOX_BYTES - _SLOT_AT:
+        if len(data) > MAILBOX_BYTES - _SLOT_OFFSET_BYTES:
             raise ConfigError("The change is too long for its way to the loop. Change fewer keys at once.")
-        self.memory[_SLOT_AT : _SLOT_AT + len(data)] = data
+        self.memory[_SLOT_OFFSET_BYTES : _SLOT_OFFSET_BYTES + len(data)] = data
         self.words[_LENGTH], self.words[_CHECK] = len(data), zlib.crc32(data)
         self.words[_ASKED] += 1
         self.ring_bell()
@@ -134,7 +134,7 @@ class Mailbox:
         """Return what became of the change of that number; None as long as the loop has not taken it."""
         if self.words[_TAKEN_NUMBER] != number:
             return None
-        return Answer(self.words[_ANSWER_CODE], float(_TIME.unpack_from(self.memory, _TIME_AT)[0]))
+        return Answer(self.words[_ANSWER_CODE], float(_TIME.unpack_from(self.memory, _TIME_OFFSET_BYTES)[0]))
 
     def withdraw(self) -> None:
         """Remove a change that the loop has not taken yet."""
@@ -148,15 +148,15 @@ class Mailbox:
     @property
     def last_words(self) -> str:
         """Sentence on the run's end; empty during the run."""
-        return bytes(self.memory[_END_TEXT_AT : _END_TEXT_AT + self.words[_END_TEXT_LENGTH]]).decode(
-            "utf-8", "replace"
-        )
+        return bytes(
+            self.memory[_END_TEXT_OFFSET_BYTES : _END_TEXT_OFFSET_BYTES + self.words[_END_TEXT_LENGTH]]
+        ).decode("utf-8", "replace")
 
     # ---------------------------------------------------------------- the loop's side
 
     def take(self) -> Change | None:
         """Return the change in the slot; None if it was withdrawn."""
-        data = self.memory[_SLOT_AT : _SLOT_AT + self.words[_LENGTH]]
+        data = self.memory[_SLOT_OFFSET_BYTES : _SLOT_OFFSET_BYTES + self.words[_LENGTH]]
         if not data or zlib.crc32(data) != self.words[_CHECK]:
             return None
         change: Change = pickle.loads(data)  # noqa: S301 - written by our own child
@@ -165,7 +165,7 @@ class Mailbox:
     def reply(self, number: int, answer: Answer) -> None:
         """Store the answer to the change with this number."""
         self.words[_ANSWER_CODE] = answer.what
-        _TIME.pack_into(self.memory, _TIME_AT, answer.t)
+        _TIME.pack_into(self.memory, _TIME_OFFSET_BYTES, answer.t)
         self.words[_TAKEN_NUMBER] = number
 
     @property
@@ -190,7 +190,7 @@ class Mailbox:
 
     def tell_end(self, sentence: str, end: int = UNCONFIRMED) -> None:
         """Write how the run ended: in words, and as a code such as `AT_ZERO`."""
-        data = readable(sentence).encode()[: _SLOT_AT - _END_TEXT_AT]
-        self.memory[_END_TEXT_AT : _END_TEXT_AT + len(data)] = data
+        data = readable(sentence).encode()[: _SLOT_OFFSET_BYTES - _END_TEXT_OFFSET_BYTES]
+        self.memory[_END_TEXT_OFFSET_BYTES : _END_TEXT_OFFSET_BYTES + len(data)] = data
         self.words[_END_TEXT_LENGTH] = len(data)
         self.words[RUN_END_WORD] = end

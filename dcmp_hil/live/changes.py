@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.safety.chatter import Chatter
 
 GAIN_RAMP_TIME_S = 0.25  # s, over which gains go from old to new
-_PLACES = {phase.value: place for place, phase in enumerate(Phase)}
+_PHASE_NUMBERS = {phase.value: place for place, phase in enumerate(Phase)}
 _LISTED_CHANGES_MAX = 1000  # changes that the summary lists
 _EVERY_CYCLE = -1  # no number of the bell: there is something to do every cycle
 _OTHER_HANDLERS = (
@@ -108,7 +108,7 @@ class LiveChanges:
     def event(self, event: Event) -> None:
         """Pass an event on; a new phase is shown in the mailbox."""
         if isinstance(event.data, PhaseData):
-            self._mailbox.tell_phase(_PLACES[event.data.phase])
+            self._mailbox.tell_phase(_PHASE_NUMBERS[event.data.phase])
         self._notify(event)
 
     def warn(self, sentence: str) -> None:

@@ -13,9 +13,9 @@ from dcmp_hil.ipc.mailbox import MAILBOX_BYTES, Mailbox
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.platform.user_folder import private, temporary, usable
 
-_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
+_CREDENTIALS_STRUCT = struct.Struct("3i")  # pid, uid, gid
 _SOCKET_PATH_CHARS_MAX = 80  # characters: the path of a socket may have 107
-_MAILBOX = "memfd:dcmp-hil mailbox"
+_MAILBOX_NAME = "memfd:dcmp-hil mailbox"
 _CONNECT_TIMEOUT_S = 0.5  # s to connect in
 
 
@@ -63,8 +63,8 @@ def running() -> list[int]:
 
 def peer_of(connection: socket.socket) -> tuple[int, int]:
     """Return process and user id of the other end."""
-    pid, uid, _ = _CREDENTIALS.unpack(
-        connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    pid, uid, _ = _CREDENTIALS_STRUCT.unpack(
+        connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS_STRUCT.size)
     )
     return pid, uid
 
@@ -73,7 +73,7 @@ def mailbox_of(pid: int) -> Mailbox | None:
     """Return the mailbox of a run by the descriptor that its process holds; None where it may not be seen."""
     with suppress(OSError):
         for link in Path(f"/proc/{pid}/fd").iterdir():
-            if link.readlink().name.startswith(_MAILBOX):
+            if link.readlink().name.startswith(_MAILBOX_NAME):
                 file = os.open(link, os.O_RDWR)
                 try:
                     return Mailbox(mapped(file, MAILBOX_BYTES))

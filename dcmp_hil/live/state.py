@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 CYCLE_AGE_MAX_S = 0.5
 """s, how old the newest cycle of a run that goes on may be."""
-_PHASES = tuple(phase.value for phase in Phase)
+_PHASE_NAMES = tuple(phase.value for phase in Phase)
 
 
 def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -
         "rig": rig.name,
         "t_s": row.get("t"),
         "age_s": age,
-        "phase": "silent" if silent else _PHASES[phase] if 0 <= phase < len(_PHASES) else "unknown",
+        "phase": "silent" if silent else _PHASE_NAMES[phase] if 0 <= phase < len(_PHASE_NAMES) else "unknown",
         "position_rad": row.get("position"),
         "velocity_rad_s": row.get("velocity_estimate"),
         "reference_rad": row.get("position_reference"),

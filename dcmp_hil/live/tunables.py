@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
-_CONTROLLER = ("kind", "kp_1_s2", "kd_1_s")
-_OBSERVER = ("mu0_rad_s", "M_rad_s3", "L1_1_s", "L2_1_s2")
+_CONTROLLER_KEYS = ("kind", "kp_1_s2", "kd_1_s")
+_OBSERVER_KEYS = ("mu0_rad_s", "M_rad_s3", "L1_1_s", "L2_1_s2")
 _NOT_OF_REFERENCE = ("soft_start_s",)  # it is over, or would jump
 
 
@@ -32,9 +32,9 @@ def settable(rig: Rig) -> list[str]:
     """List the dotted keys that may change while this rig runs."""
     keys: list[str] = []
     if isinstance(rig.controller, PdSettings):
-        keys += [f"controller.{key}" for key in _CONTROLLER]
+        keys += [f"controller.{key}" for key in _CONTROLLER_KEYS]
     if isinstance(rig.observer, SuperTwistingSettings):
-        keys += [f"observer.{key}" for key in _OBSERVER]
+        keys += [f"observer.{key}" for key in _OBSERVER_KEYS]
     if isinstance(rig.reference, Table):
         return [*keys, "reference.kind"]
     fields = type(rig.reference).model_fields

@@ -20,15 +20,17 @@ DAY_S = 86_400.0  # s
 
 _CELL_CHARS_MAX = 400  # characters: a longer cell is text, and searching it would take long
 _SPACES = "\u00a0\u202f\u2009"
-_PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
-_HEX = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
-_DRESSED = re.compile(r"[(\['=]*\s*(?:[A-Za-z_]\w*\s*[:=]\s*)?(?P<number>[+\-\u2212]?[\d.,].*?)\s*[)\]']*")
-_TAIL = re.compile(r"(?P<number>.*?[\d.,])\s*(?P<unit>[^\d\s.,+-][^\d,;]*)")
-_GROUPED = {
+_PLAIN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_HEX_NUMBER = re.compile(r"0[xX][0-9a-fA-F]{1,8}")
+_DECORATED_NUMBER = re.compile(
+    r"[(\['=]*\s*(?:[A-Za-z_]\w*\s*[:=]\s*)?(?P<number>[+\-\u2212]?[\d.,].*?)\s*[)\]']*"
+)
+_NUMBER_WITH_UNIT = re.compile(r"(?P<number>.*?[\d.,])\s*(?P<unit>[^\d\s.,+-][^\d,;]*)")
+_GROUPED_NUMBER = {
     ".": re.compile(rf"[+-]?[1-9]\d{{0,2}}([,' {_SPACES}]\d{{3}})+(\.\d*)?"),
     ",": re.compile(rf"[+-]?[1-9]\d{{0,2}}([.' {_SPACES}]\d{{3}})+(,\d*)?"),
 }
-_CLOCK = re.compile(
+_CLOCK_TIME = re.compile(
     r"""[("']*\s*
     (?:(?P<date>\d{4}-\d{1,2}-\d{1,2} | \d{4}/\d{1,2}/\d{1,2} | \d{8}
         | \d{1,2}[./-](?:\d{1,2}|[A-Za-z]{3,4})[./-]\d{2,4} | [A-Za-z]{3}\s+\d{1,2})[T\s,_]+)?
@@ -38,7 +40,7 @@ _CLOCK = re.compile(
     \s*[)"']*""",
     re.VERBOSE,
 )
-_ISO = re.compile(r"(\d{4})[-/](\d{1,2})[-/](\d{1,2})|(\d{4})(\d{2})(\d{2})")
+_ISO_DATE = re.compile(r"(\d{4})[-/](\d{1,2})[-/](\d{1,2})|(\d{4})(\d{2})(\d{2})")
 
 
 def number(cell: str, decimal: str = ".") -> float:
@@ -56,29 +58,29 @@ def number(cell: str, decimal: str = ".") -> float:
     if len(cell) > _CELL_CHARS_MAX:
         return math.nan
     text = cell.strip()
-    if decimal == "." and _PLAIN.fullmatch(text):
+    if decimal == "." and _PLAIN_NUMBER.fullmatch(text):
         return _finite(text)
-    if _HEX.fullmatch(text):
+    if _HEX_NUMBER.fullmatch(text):
         return float(int(text, 16))
-    dressed = _DRESSED.fullmatch(text)
+    dressed = _DECORATED_NUMBER.fullmatch(text)
     if dressed is None:
         return math.nan
     bare = dressed["number"].replace("\u2212", "-")
     value = _undressed(bare, decimal)
     if math.isnan(value):
-        tail = _TAIL.fullmatch(bare)
+        tail = _NUMBER_WITH_UNIT.fullmatch(bare)
         if tail and any_unit(tail["unit"]):
             value = _undressed(tail["number"], decimal)
     return value
 
 
 def _undressed(text: str, decimal: str) -> float:
-    if _GROUPED[decimal].fullmatch(text):
+    if _GROUPED_NUMBER[decimal].fullmatch(text):
         keep = f"[^0-9eE+{re.escape(decimal)}-]"
         text = re.sub(keep, "", text)
     if decimal == "," and text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
-    return _finite(text) if _PLAIN.fullmatch(text) else math.nan
+    return _finite(text) if _PLAIN_NUMBER.fullmatch(text) else math.nan
 
 
 def _finite(text: str) -> float:
@@ -88,8 +90,8 @@ def _finite(text: str) -> float:
 
 def unit_in(cell: str) -> str | None:
     """Return the unit that stands behind the number of a cell, if one does."""
-    dressed = _DRESSED.fullmatch(cell.strip()) if len(cell) <= _CELL_CHARS_MAX else None
-    tail = dressed and _TAIL.fullmatch(dressed["number"])
+    dressed = _DECORATED_NUMBER.fullmatch(cell.strip()) if len(cell) <= _CELL_CHARS_MAX else None
+    tail = dressed and _NUMBER_WITH_UNIT.fullmatch(dressed["number"])
     return tail["unit"].strip() if tail and any_unit(tail["unit"]) else None
 
 
@@ -101,7 +103,7 @@ def label_in(cell: str) -> str | None:
 
 def is_clock(cell: str) -> bool:
     """Whether a cell holds a time of day, with or without a date."""
-    return ":" in cell and len(cell) <= _CELL_CHARS_MAX and _CLOCK.fullmatch(cell.strip()) is not None
+    return ":" in cell and len(cell) <= _CELL_CHARS_MAX and _CLOCK_TIME.fullmatch(cell.strip()) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:
@@ -151,7 +153,7 @@ def clock_times(cells: Sequence[str]) -> NDArray[np.float64]:
 
 def _seconds(cell: str) -> tuple[float, float]:
     """Return the days since 1970 (0 where no ISO date is), and the seconds of the day in UTC."""
-    found = _CLOCK.fullmatch(cell.strip())
+    found = _CLOCK_TIME.fullmatch(cell.strip())
     if found is None:
         return math.nan, math.nan
     hour = int(found["hour"] or 0)
@@ -168,7 +170,7 @@ def _seconds(cell: str) -> tuple[float, float]:
 
 @cache
 def _days(date: str) -> float:
-    found = _ISO.fullmatch(date)
+    found = _ISO_DATE.fullmatch(date)
     if found is None:
         return 0.0
     year, month, day = (part for part in found.groups() if part)

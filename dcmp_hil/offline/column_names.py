@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.offline.units import Quantity
 
 # Words that a quantity goes by, the likeliest first; German ones, too, since Excel and LabVIEW write them.
-_NAMES: dict[Quantity, tuple[str, ...]] = {
+_QUANTITY_NAMES: dict[Quantity, tuple[str, ...]] = {
     "time": (
         "time",
         "t",
@@ -41,7 +41,7 @@ _NAMES: dict[Quantity, tuple[str, ...]] = {
     ),
 }
 # Whole names whose words alone would not tell.
-_WHOLE: dict[str, Quantity] = {
+_WHOLE_NAMES: dict[str, Quantity] = {
     "x value": "time",
     "x values": "time",
     "date time": "time",
@@ -49,10 +49,23 @@ _WHOLE: dict[str, Quantity] = {
     "datum zeit": "time",
     "counts": "position",
 }
-_WHOLE |= dict.fromkeys(("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time")
+_WHOLE_NAMES |= dict.fromkeys(
+    ("millis", "micros", "ms", "us", "sec", "secs", "seconds", "milliseconds"), "time"
+)
 _NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
 _SHOWN_NAMES_MAX = 30
-_NUMBERS = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
+_ROW_NUMBER_NAMES = (
+    "sample",
+    "samples",
+    "sample number",
+    "sample no",
+    "n",
+    "k",
+    "index",
+    "idx",
+    "seq",
+    "sequence",
+)
 _AMBIGUOUS_NAMES = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
 
@@ -62,18 +75,18 @@ def _words(text: str) -> frozenset[str]:
 
 # What a name may add to one of these words: nothing of consequence, that it is the command rather than the
 # measurement, or that it is something else altogether.
-_PLAIN = _words("""measured meas mes actual act real fb feedback applied given rel
+_PLAIN_WORDS = _words("""measured meas mes actual act real fb feedback applied given rel
     motor joint pendulum arm shaft output encoder angle angular""")
-_COMMAND = _words("command commanded cmd desired des demand demanded sent control ctrl")
-_DRIVE = _words("drive input amp amplifier")
+_COMMAND_WORDS = _words("command commanded cmd desired des demand demanded sent control ctrl")
+_DRIVE_WORDS = _words("drive input amp amplifier")
 _OTHER_WORDS = _words("""reference ref target setpoint goal error err estimate estimated est hat true filtered
     filt limit min max std constant offset index id acceleration accel acc current temperature temp
     bus supply battery dc""")
-_ALL_NAMES = frozenset(word for words in _NAMES.values() for word in words)
-_DESCRIBING = (
-    _PLAIN
-    | _COMMAND
-    | _DRIVE
+_ALL_NAMES = frozenset(word for words in _QUANTITY_NAMES.values() for word in words)
+_DESCRIBING_WORDS = (
+    _PLAIN_WORDS
+    | _COMMAND_WORDS
+    | _DRIVE_WORDS
     | _OTHER_WORDS
     | _ALL_NAMES
     | frozenset(_NO_UNIT)
@@ -160,7 +173,7 @@ def match(
     if unit is not None:
         return Match(quantity, name, *known_unit(quantity, unit), "option")
     words, found = _parts(quantity, name)
-    found = written_unit(quantity, name, _DESCRIBING) or found
+    found = written_unit(quantity, name, _DESCRIBING_WORDS) or found
     if found is None and len(words) == 1:
         found = find_unit(quantity, words[0])
     if found is not None:
@@ -184,12 +197,12 @@ def is_format(told: str) -> bool:
 
 def known_in(fields: Sequence[str]) -> int:
     """Return how many quantities the names of a line are known as."""
-    return sum(any(_rank(quantity, name) is not None for name in fields) for quantity in _NAMES)
+    return sum(any(_rank(quantity, name) is not None for name in fields) for quantity in _QUANTITY_NAMES)
 
 
 def sample_number(header: Sequence[str]) -> str | None:
     """Return the column that numbers the samples, if one is called so."""
-    return next((name for name in header if " ".join(_parts("time", name)[0]) in _NUMBERS), None)
+    return next((name for name in header if " ".join(_parts("time", name)[0]) in _ROW_NUMBER_NAMES), None)
 
 
 def split_time(header: Sequence[str]) -> tuple[str, str] | None:
@@ -241,35 +254,43 @@ def _likeliest(quantity: Quantity, header: Sequence[str]) -> str | None:
 def _rank(quantity: Quantity, name: str) -> tuple[int, int] | None:
     """Return the rank of a column, the likeliest smallest; None for another quantity."""
     words, unit = _parts(quantity, name)
-    if " ".join(words) in _WHOLE:
-        return (1, 99) if _WHOLE[" ".join(words)] == quantity else None
+    if " ".join(words) in _WHOLE_NAMES:
+        return (1, 99) if _WHOLE_NAMES[" ".join(words)] == quantity else None
     words = [_without_number(quantity, word) for word in words]
-    names = [word for word in words if word in _NAMES[quantity] and (unit or word not in _AMBIGUOUS_NAMES)]
-    if not names and unit and words and quantity != "time" and _PLAIN.union(_DRIVE).issuperset(words):
+    names = [
+        word for word in words if word in _QUANTITY_NAMES[quantity] and (unit or word not in _AMBIGUOUS_NAMES)
+    ]
+    if (
+        not names
+        and unit
+        and words
+        and quantity != "time"
+        and _PLAIN_WORDS.union(_DRIVE_WORDS).issuperset(words)
+    ):
         return (4, 0)  # such as motor_V
     rest = [word for word in words if word not in names[:1]]
     if not names or _OTHER_WORDS.intersection(words) or any(_says_other(quantity, word) for word in rest):
         return None
-    order = _NAMES[quantity].index(names[0])
-    if _COMMAND.intersection(words):
+    order = _QUANTITY_NAMES[quantity].index(names[0])
+    if _COMMAND_WORDS.intersection(words):
         # The next best thing for an input, and nothing of a measurement.
         return (3, order) if quantity in ("torque", "voltage") else None
     if not rest:
         return (0, order)
-    return (1 if _PLAIN.issuperset(rest) else 2, order)
+    return (1 if _PLAIN_WORDS.issuperset(rest) else 2, order)
 
 
 def _without_number(quantity: Quantity, word: str) -> str:
     """Return a word without the number of a joint, as in `position0`."""
     bare = word.rstrip("0123456789")
-    return bare if len(bare) > 2 and bare in _NAMES[quantity] else word  # noqa: PLR2004 - x1 is a name
+    return bare if len(bare) > 2 and bare in _QUANTITY_NAMES[quantity] else word  # noqa: PLR2004 - x1 is a name
 
 
 def _says_other(quantity: Quantity, word: str) -> bool:
     """Whether a word names another quantity outright, like the second one of `joint_velocity`."""
-    if word in _PLAIN or word in _NAMES[quantity] or len(word) == 1:
+    if word in _PLAIN_WORDS or word in _QUANTITY_NAMES[quantity] or len(word) == 1:
         return False
-    return any(word in names for other, names in _NAMES.items() if other != quantity)
+    return any(word in names for other, names in _QUANTITY_NAMES.items() if other != quantity)
 
 
 def _parts(quantity: Quantity, name: str) -> tuple[list[str], tuple[str, float] | None]:

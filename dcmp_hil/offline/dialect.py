@@ -18,7 +18,9 @@ _SAMPLE_LINES = 150  # lines that the layout is told from
 MAJORITY_SHARE = 0.5
 COMMENT = re.compile(r"\s*(?:#+|%+|//+|;+(?=\s*[A-Za-z#]))\s*")
 _SEPARATOR = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
-_MONITOR = re.compile(r"(\[?\d{1,2}:\d{2}:\d{2}[.,]\d+\]?)\s*(?:->|>)\s*")  # a serial monitor's time stamp
+_MONITOR_STAMP = re.compile(  # a serial monitor's time stamp
+    r"(\[?\d{1,2}:\d{2}:\d{2}[.,]\d+\]?)\s*(?:->|>)\s*"
+)
 BLANK = " "  # any white space
 
 # Preferred from the left where two explain the file equally well.
@@ -60,7 +62,7 @@ def prepared(lines: Sequence[str]) -> tuple[list[tuple[int, str]], str]:
             forced = separator[1]
             continue
         kept.append((number, text))
-    stamped = [_MONITOR.match(text) for _, text in kept[: _SAMPLE_LINES * 2]]
+    stamped = [_MONITOR_STAMP.match(text) for _, text in kept[: _SAMPLE_LINES * 2]]
     if sum(map(bool, stamped)) > MAJORITY_SHARE * len(stamped):
         kept = [(number, _unstamped(text)) for number, text in kept]
     return kept, forced
@@ -68,7 +70,7 @@ def prepared(lines: Sequence[str]) -> tuple[list[tuple[int, str]], str]:
 
 def _unstamped(text: str) -> str:
     """Return a line without the time stamp of a serial monitor: the device's own clock is better."""
-    return _MONITOR.sub("", text, count=1)
+    return _MONITOR_STAMP.sub("", text, count=1)
 
 
 def split(text: str, delimiter: str) -> list[str]:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _BRACKETED = re.compile(r"[^\[({]*[\w\s.][\[({]\s*([^\[\](){}]*?)\s*[\])}]\s*")
 _SLASHED = re.compile(r"\s*[^\W\d_]\w*\s*/\s*([^\s/]{1,7})\s*")
 _PER_CENT = re.compile(r".*[\w\s](%)\s*")
-_CHANNEL = re.compile(r"#?\d+|[A-Za-z]+[\s_]?\d+")
-_CLOCK = re.compile(r"utc|gmt|local|relative|absolute|date|iso\W*\d*", re.IGNORECASE)
+_CHANNEL_NAME = re.compile(r"#?\d+|[A-Za-z]+[\s_]?\d+")
+_CLOCK_WORD = re.compile(r"utc|gmt|local|relative|absolute|date|iso\W*\d*", re.IGNORECASE)
 _DAMAGED_DEGREE = "\u00ef\u00bf\u00bd"  # U+FFFD in UTF-8, read as Windows-1252
 
 
@@ -57,7 +57,7 @@ def written_unit(quantity: Quantity, name: str, plain: Container[str]) -> tuple[
     described = all(word.lower() in plain for word in words if not find_unit(quantity, word))
     if len(units) == 1 and described:
         return units[0]
-    if not units and (described or _CHANNEL.fullmatch(told) or _is_time(quantity, told)):
+    if not units and (described or _CHANNEL_NAME.fullmatch(told) or _is_time(quantity, told)):
         return None
     raise ConfigError(
         f'{quantity}: the column "{name}" is in "{told}", which is no unit of {quantity}. '
@@ -79,4 +79,4 @@ def _is_time(quantity: Quantity, told: str) -> bool:
     if quantity != "time":
         return False
     zone = re.fullmatch(r"(UTC|GMT)?\s*[+-]\d{1,2}(:?\d{2})?", told)
-    return bool(zone or _CLOCK.fullmatch(told) or re.search(r"[hHmM]{1,2}:[mMsS]{1,2}|[yY]{2}", told))
+    return bool(zone or _CLOCK_WORD.fullmatch(told) or re.search(r"[hHmM]{1,2}:[mMsS]{1,2}|[yY]{2}", told))

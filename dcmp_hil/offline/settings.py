@@ -11,7 +11,7 @@ from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
 
 InputKind = Literal["torque", "voltage", "none"]
-_PAPER = Model()
+_PAPER_MODEL = Model()
 _CURRENT_FOLDER = Path()
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
@@ -35,7 +35,7 @@ class ReplaySettings:
     """Where its module is looked for beside what is installed."""
     from_zero: bool = False
     """Whether the paper's observer begins at 0, as in the paper, and not at the first position."""
-    model: Model = _PAPER
+    model: Model = _PAPER_MODEL
     """What an observer of your own is told of the plant; `f0` and `ku` below come first."""
     f0: float | None = None
     """Viscous friction over inertia fd/J, 1/s; None: that of `model`, the paper's 0.1."""

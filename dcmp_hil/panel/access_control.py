@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
-_POLICY = (
+_CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "frame-src {frames}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
@@ -43,7 +43,7 @@ class AccessControl:
         self._port = port
         parts = urlsplit(viewer)
         self._headers = {
-            "Content-Security-Policy": _POLICY.format(
+            "Content-Security-Policy": _CONTENT_SECURITY_POLICY.format(
                 frames=f"{parts.scheme}://{parts.netloc}" if viewer else "'none'"
             ),
             "Cache-Control": "no-store",

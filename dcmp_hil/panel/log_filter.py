@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import asyncio
     from collections.abc import Iterator
 
-_NAMES = ("aiohttp.server", "aiohttp.web", "aiohttp.internal", "aiohttp.access", "asyncio")
+_LOGGER_NAMES = ("aiohttp.server", "aiohttp.web", "aiohttp.internal", "aiohttp.access", "asyncio")
 _LINE_KINDS_MAX = 20  # of lines
 
 
@@ -44,12 +44,12 @@ def quiet(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
         error = context.get("exception")
         log.error("%s (%s)", context.get("message", "an error"), type(error).__name__)
 
-    for name in _NAMES:
+    for name in _LOGGER_NAMES:
         logging.getLogger(name).addFilter(once)
     loop.set_exception_handler(told)
     try:
         yield
     finally:
         loop.set_exception_handler(None)
-        for name in _NAMES:
+        for name in _LOGGER_NAMES:
             logging.getLogger(name).removeFilter(once)

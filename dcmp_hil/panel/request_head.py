@@ -11,10 +11,10 @@ BODY_BYTES_MAX = 1 << 14
 """Bytes of a body."""
 _HEADERS_MAX = 64
 _TARGET_CHARS_MAX = 2048  # characters
-_END = b"\r\n\r\n"
+_HEAD_END = b"\r\n\r\n"
 _FORBIDDEN_BYTES = re.compile(rb"[^\x20-\x7e\r\n\t]|(?<!\r)\n|\r[^\n]")
-_FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*(.*?)[ \t]*")
-_LINE = re.compile(rb"([A-Z]{1,20}) (/[\x21-\x7e]*) HTTP/1\.[01]")
+_HEADER_FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*(.*?)[ \t]*")
+_REQUEST_LINE = re.compile(rb"([A-Z]{1,20}) (/[\x21-\x7e]*) HTTP/1\.[01]")
 _METHODS = {b"GET", b"HEAD", b"POST"}
 _UNIQUE_HEADERS = {b"host", b"content-length", b"origin", b"cookie", b"content-type"}
 _REFUSED_HEADER_STATUS = {
@@ -64,7 +64,7 @@ def head_of(data: bytes) -> Head | None:
     RequestError
         If this server answers no such request, with any body.
     """
-    end = data.find(_END)
+    end = data.find(_HEAD_END)
     head = data[: end + 2] if end >= 0 else data
     if len(head) > HEAD_BYTES_MAX:
         raise RequestError(431)
@@ -75,11 +75,11 @@ def head_of(data: bytes) -> Head | None:
     first, *lines = head[:-2].split(b"\r\n")
     method, target = _request_line(first)
     fields = _fields(lines)
-    return Head(end + len(_END), method, target, fields, _length(method, fields))
+    return Head(end + len(_HEAD_END), method, target, fields, _length(method, fields))
 
 
 def _request_line(line: bytes) -> tuple[bytes, bytes]:
-    found = _LINE.fullmatch(line)
+    found = _REQUEST_LINE.fullmatch(line)
     if found is None:
         raise RequestError
     method, target = found.groups()
@@ -95,7 +95,7 @@ def _fields(lines: list[bytes]) -> tuple[tuple[bytes, bytes], ...]:
         raise RequestError(431)
     fields = []
     for line in lines:
-        found = _FIELD.fullmatch(line)
+        found = _HEADER_FIELD.fullmatch(line)
         if found is None:
             raise RequestError
         fields.append((found[1], found[2]))

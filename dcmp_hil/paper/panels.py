@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, REFERENCE, TRUE, VOLTAGE
+from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, REFERENCE_RGB, TRUE_RGB, VOLTAGE_RGB
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,10 +55,10 @@ class FigurePanel:
     zoom: tuple[float, float, float, float] | None = None
 
 
-_X1, _X2 = FigureLine("x1", "$x_1$", TRUE), FigureLine("x2", "$x_2$", TRUE)
-_X1_HAT = FigureLine("x1_hat", r"$\hat{x}_1$", ESTIMATE, dashed=True)
-_X2_HAT = FigureLine("x2_hat", r"$\hat{x}_2$", ESTIMATE, dashed=True)
-_XR = FigureLine("xr", "$x_r$", REFERENCE, dashed=True)
+_X1, _X2 = FigureLine("x1", "$x_1$", TRUE_RGB), FigureLine("x2", "$x_2$", TRUE_RGB)
+_X1_HAT = FigureLine("x1_hat", r"$\hat{x}_1$", ESTIMATE_RGB, dashed=True)
+_X2_HAT = FigureLine("x2_hat", r"$\hat{x}_2$", ESTIMATE_RGB, dashed=True)
+_XR = FigureLine("xr", "$x_r$", REFERENCE_RGB, dashed=True)
 _E1, _E2 = r"$\hat{x}_1 - x_1$", r"$\hat{x}_2 - x_2$"
 
 FIGURES: dict[str, tuple[str, tuple[FigurePanel, ...]]] = {
@@ -74,13 +74,13 @@ FIGURES: dict[str, tuple[str, tuple[FigurePanel, ...]]] = {
         (
             FigurePanel(
                 f"{_E1}, rad",
-                (FigureLine("x1_error", "", ERROR, width=0.8),),
+                (FigureLine("x1_error", "", ERROR_RGB, width=0.8),),
                 late_label=f"{_E1}, nrad",
                 late_scale=1e9,
             ),
             FigurePanel(
                 f"{_E2}, rad/s",
-                (FigureLine("x2_error", "", ERROR, width=0.8),),
+                (FigureLine("x2_error", "", ERROR_RGB, width=0.8),),
                 late_label=f"{_E2}, mrad/s",
                 late_scale=1e3,
             ),
@@ -92,7 +92,7 @@ FIGURES: dict[str, tuple[str, tuple[FigurePanel, ...]]] = {
             FigurePanel("position, rad", (_X1, _XR), "lower right", shared=True),
             FigurePanel(
                 "$x_1 - x_r$, rad",
-                (FigureLine("tracking", "", ERROR, width=0.8),),
+                (FigureLine("tracking", "", ERROR_RGB, width=0.8),),
                 late_label="$x_1 - x_r$, µrad",
                 late_scale=1e6,
             ),
@@ -103,13 +103,13 @@ FIGURES: dict[str, tuple[str, tuple[FigurePanel, ...]]] = {
         (
             FigurePanel(
                 r"control $\tau$, V",
-                (FigureLine("voltage", "", VOLTAGE, width=1.0),),
+                (FigureLine("voltage", "", VOLTAGE_RGB, width=1.0),),
                 zoom=(0.0, 0.5, -140.0, 60.0),
             ),
-            FigurePanel(r"disturbance $\eta/J$, rad/s²", (FigureLine("eta", "", TRUE),), shared=True),
+            FigurePanel(r"disturbance $\eta/J$, rad/s²", (FigureLine("eta", "", TRUE_RGB),), shared=True),
             FigurePanel(
                 "$w$, rad/s²",
-                (FigureLine("w_hat", r"$\hat{w}$", ESTIMATE), FigureLine("w", "$w$", TRUE)),
+                (FigureLine("w_hat", r"$\hat{w}$", ESTIMATE_RGB), FigureLine("w", "$w$", TRUE_RGB)),
                 "upper right",
             ),
         ),

@@ -11,11 +11,11 @@ from typing import Any
 from dcmp_hil.errors import ConfigError
 
 _CAP_SYS_NICE_BIT, _CAP_IPC_LOCK_BIT = 23, 14  # bits of CAP_SYS_NICE and CAP_IPC_LOCK in linux/capability.h
-_FLAVOURS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the longer names first
-_GOVERNOR = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
-_MODEL = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
-_THROTTLE = "/proc/sys/kernel/sched_rt_runtime_us"
-_LOADAVG = "/proc/loadavg"
+_PREEMPTION_MODELS = ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT_LAZY", "PREEMPT")  # the longer names first
+_GOVERNOR_FILE = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"
+_PREEMPTION_FILE = "/sys/kernel/debug/sched/preempt"  # of a dynamic kernel; the one in brackets is in force
+_THROTTLING_FILE = "/proc/sys/kernel/sched_rt_runtime_us"
+_LOAD_FILE = "/proc/loadavg"
 _LINUX_MODULES = ("fcntl", "resource", "termios")
 
 
@@ -52,13 +52,13 @@ def host_facts() -> dict[str, Any]:
         first), ``rt_runtime_us`` (of each second, for real-time threads; -1 for all of it), ``privileges``
         and ``python``.
     """
-    throttle = read_fact(_THROTTLE)
+    throttle = read_fact(_THROTTLING_FILE)
     return {
         "system": platform.system(),
         "kernel": platform.release(),
-        "preemption": preemption(platform.version(), read_fact(_MODEL)),
+        "preemption": preemption(platform.version(), read_fact(_PREEMPTION_FILE)),
         "cpus": _cpus(),
-        "governor": read_fact(_GOVERNOR),
+        "governor": read_fact(_GOVERNOR_FILE),
         "rt_runtime_us": None if throttle is None else int(throttle),
         "privileges": privileges(),
         "python": f"{platform.python_implementation()} {platform.python_version()}",
@@ -70,7 +70,7 @@ def in_words(facts: dict[str, Any]) -> str:
     return ", ".join(f"{name} {'unknown' if fact is None else fact}" for name, fact in facts.items())
 
 
-def contention(loadavg: str = _LOADAVG, cpus: int | None = None) -> str:
+def contention(loadavg: str = _LOAD_FILE, cpus: int | None = None) -> str:
     """Return a clause on the number of ready threads, if it exceeds that of processors.
 
     Parameters
@@ -136,7 +136,7 @@ def preemption(version: str, model: str | None) -> str:
         may not be read.
     """
     words = version.split()
-    flavour = next((name for name in _FLAVOURS if name in words), "none")
+    flavour = next((name for name in _PREEMPTION_MODELS if name in words), "none")
     if model and "(" in model:
         return f"{flavour} ({model.split('(')[1].split(')')[0]})"
     return flavour

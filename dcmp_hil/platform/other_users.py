@@ -6,7 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-_TABLE = Path("/proc/net/tcp")
+_SOCKET_TABLE = Path("/proc/net/tcp")
 _CONNECTED_STATES = {"01", "04", "05", "08"}  # established, and on the way out with what was read
 _PERSON_USER_IDS = range(1000, 60_000)  # user numbers, as distributions give them
 _ROOT_USER_ID = 0  # may do as it likes, and reads this process's memory
@@ -16,7 +16,7 @@ def strangers(port: int) -> list[int]:
     """Return the users, this one and root left out, who are connected to a port of 127.0.0.1."""
     here = f"0100007F:{port:04X}"
     try:
-        rows = [line.split() for line in _TABLE.read_text("ascii").splitlines()[1:]]
+        rows = [line.split() for line in _SOCKET_TABLE.read_text("ascii").splitlines()[1:]]
     except OSError:  # not Linux: it cannot be found out
         return []
     users = {int(row[7]) for row in rows if row[2] == here and row[3] in _CONNECTED_STATES}

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-FILE = "process.log"
+LOG_FILE_NAME = "process.log"
 """Its name in a run's folder."""
 STDERR_FILENO = 2
 """The descriptor that libraries write to."""

@@ -34,12 +34,12 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall
 _PR_SET_TIMERSLACK = 29  # prctl: PR_SET_TIMERSLACK
 _USUAL_SLACK_NS = 0  # ns; 0 means: as the process began
 
-_LIMITS = (
+_LIMITS_REMEDY = (
     "put a line `YOU - {limit}`, YOU being your user name, into /etc/security/limits.conf and log in again"
 )
-_RTPRIO = f"To allow it, {_LIMITS.format(limit='rtprio 98')}"
-_MEMLOCK = f"To allow it, {_LIMITS.format(limit='memlock unlimited')}"
-_CPU = "Name one that this process may use in timing.cpu: `taskset -cp $$` lists them"
+_RTPRIO_REMEDY = f"To allow it, {_LIMITS_REMEDY.format(limit='rtprio 98')}"
+_MEMLOCK_REMEDY = f"To allow it, {_LIMITS_REMEDY.format(limit='memlock unlimited')}"
+_CPU_REMEDY = "Name one that this process may use in timing.cpu: `taskset -cp $$` lists them"
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,14 +157,14 @@ class RealTime:
 
 
 def _wishes(timing: RealtimeSettings) -> list[_Wish]:
-    pinned = [_Wish(f"CPU {timing.cpu}", _pin, _CPU, matters=True)] if timing.cpu != "any" else []
+    pinned = [_Wish(f"CPU {timing.cpu}", _pin, _CPU_REMEDY, matters=True)] if timing.cpu != "any" else []
     return [
         _Wish("collector off", _quiet_collector, "", matters=False),
         _Wish("switch interval", _switch_sooner, "", matters=False),
         _Wish("timer slack", _sharpen_timer, "", matters=False),
-        _Wish("locked memory", _lock_memory, _MEMLOCK, matters=True),
+        _Wish("locked memory", _lock_memory, _MEMLOCK_REMEDY, matters=True),
         *pinned,
-        _Wish("SCHED_FIFO", _be_first, _RTPRIO, matters=True),
+        _Wish("SCHED_FIFO", _be_first, _RTPRIO_REMEDY, matters=True),
     ]
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-_CODES = (Fault, int)
+_FAULT_CODE_TYPES = (Fault, int)
 
 
 class CheckedBackend:
@@ -82,7 +82,7 @@ class CheckedBackend:
             raise self._failed(error, self._read) from error
         if type(sample) is Sample:
             t, position, voltage, fault = sample
-            if type(t) is type(position) is type(voltage) is float and type(fault) in _CODES:
+            if type(t) is type(position) is type(voltage) is float and type(fault) in _FAULT_CODE_TYPES:
                 return sample
         return self._converted(sample)
 

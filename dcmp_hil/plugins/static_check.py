@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.plugins.roles import Role
 
-_SOURCE = (".py", ".pyw")
+_SOURCE_SUFFIXES = (".py", ".pyw")
 
 
 def look_at(path: str, role: Role, folders: Sequence[Path], options: Collection[str] = ()) -> None:
@@ -51,8 +51,10 @@ def look_at(path: str, role: Role, folders: Sequence[Path], options: Collection[
         return
     if place is None or not place.whole:
         raise ConfigError(not_found(said, module, folders))
-    trees = [_parsed(spec.origin, said) for spec in place.specs if (spec.origin or "").endswith(_SOURCE)]
-    if not (place.specs[-1].origin or "").endswith(_SOURCE):
+    trees = [
+        _parsed(spec.origin, said) for spec in place.specs if (spec.origin or "").endswith(_SOURCE_SUFFIXES)
+    ]
+    if not (place.specs[-1].origin or "").endswith(_SOURCE_SUFFIXES):
         return  # compiled: only running it would tell
     names: dict[str, ast.stmt] = {}
     if not _collect(trees[-1].body, names):

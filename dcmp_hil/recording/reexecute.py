@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.values import Estimate, Event
 
-_AT = {name: place for place, name in enumerate(FIELDS)}
+_FIELD_NUMBERS = {name: place for place, name in enumerate(FIELDS)}
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,8 @@ def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexe
         estimate = observer.update(sample)
         past.follow(row, estimate)
         ahead = predictor.ahead(sample, estimate)
-        demands.append(controller.update(Reference(*row[_AT["position_ahead"] :][:3]), ahead))
-        predictor.sent(row[_AT["voltage_sent"]])
+        demands.append(controller.update(Reference(*row[_FIELD_NUMBERS["position_ahead"] :][:3]), ahead))
+        predictor.sent(row[_FIELD_NUMBERS["voltage_sent"]])
         estimates.append(estimate)
         if made and made[0][0] <= sample.t:  # later where the period itself is missing
             mailbox.put(made.popleft()[1])
@@ -135,7 +135,7 @@ class _Past:
 
     def follow(self, row: list[float], estimate: Estimate) -> None:
         """Repeat the trajectory's transitions of the recorded cycle."""
-        t, began = row[0], row[_AT["began"]]
+        t, began = row[0], row[_FIELD_NUMBERS["began"]]
         if self._holds:  # the first period of the run, and of the way down
             self._holds = False
             self._trajectory.hold(estimate.position)

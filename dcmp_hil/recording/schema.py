@@ -43,8 +43,8 @@ def _with_unit(field: str) -> str:
     return f"{field}_{unit}" if unit else field
 
 
-NAMES = tuple(_with_unit(field) for field in FIELDS)
-CYCLE_SCHEMA = "\n".join(f"float64 {name}" for name in NAMES).encode()
+CHANNEL_NAMES = tuple(_with_unit(field) for field in FIELDS)
+CYCLE_SCHEMA = "\n".join(f"float64 {name}" for name in CHANNEL_NAMES).encode()
 EVENT_SCHEMA = json.dumps(
     {
         "title": "foxglove.Log",

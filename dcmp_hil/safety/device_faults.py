@@ -14,7 +14,7 @@ class Meaning(NamedTuple):
     remedy: str
 
 
-_MEANINGS = {
+_FAULT_MEANINGS = {
     Fault.HOST_SILENT: Meaning(
         "The device heard no valid command for longer than its watchdog allows",
         "The computer was too busy, or commands arrive damaged or too late: close other programs, look at "
@@ -67,7 +67,7 @@ def meaning_of(code: int) -> Meaning:
         f"The device reports fault {code}, which this version does not know",
         "Look it up in the firmware's own list, mend the cause, then start again.",
     )
-    return _MEANINGS.get(Fault(code), unknown) if code in set(Fault) else unknown
+    return _FAULT_MEANINGS.get(Fault(code), unknown) if code in set(Fault) else unknown
 
 
 def name_of(code: int) -> str:

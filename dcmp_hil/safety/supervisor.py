@@ -43,7 +43,7 @@ class PhaseEvent(Enum):
     STOPPED = auto()
 
 
-TABLE: Mapping[Phase, Mapping[PhaseEvent, Phase]] = {
+TRANSITIONS: Mapping[Phase, Mapping[PhaseEvent, Phase]] = {
     Phase.ARMING: {
         PhaseEvent.ARMED: Phase.PROBING,
         PhaseEvent.ARMED_UNPROBED: Phase.SETTLING,
@@ -222,7 +222,7 @@ class Supervisor:
         return self.limiter.limit_slew(max(-most, min(most, demand)), self._last)
 
     def _advance(self, event: PhaseEvent, t: float) -> None:
-        following = TABLE[self.phase].get(event)
+        following = TRANSITIONS[self.phase].get(event)
         if following is None:
             return
         self.phase, self._since = following, t

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Reference
 
 _COLUMN = {name: index for index, name in enumerate(FIELDS)}
-_REFERENCE = slice(_COLUMN["position_reference"], _COLUMN["acceleration_reference"] + 1)
+_REFERENCE_COLUMNS = slice(_COLUMN["position_reference"], _COLUMN["acceleration_reference"] + 1)
 _SAME_INSTANT_SHARE = 0.02  # of the delay: instants that differ by less are one
 
 
@@ -49,7 +49,7 @@ class Block:
     @property
     def reference(self) -> NDArray[np.float64]:
         """Position rad, velocity rad/s and acceleration rad/s2 at each row's own `t`, shape (n, 3)."""
-        return self.rows[:, _REFERENCE]
+        return self.rows[:, _REFERENCE_COLUMNS]
 
     @property
     def gravity(self) -> NDArray[np.float64]:

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.link_diagnosis import Concern, LinkCounters
 
-HOST = ("lost", "stale", "skipped", "corrupt", "missed", "limited", "late")
+HOST_COUNTERS = ("lost", "stale", "skipped", "corrupt", "missed", "limited", "late")
 """Counters of the host's side, in the order in which they are told."""
-DEVICE = ("crc_errors", "sequence_gaps", "ring_overruns", "bus_offs", "late_ticks")
+DEVICE_COUNTERS = ("crc_errors", "sequence_gaps", "ring_overruns", "bus_offs", "late_ticks")
 """Counters of the device's side: HEALTH, which stop at 255."""
 
 
@@ -82,13 +82,13 @@ class LinkWatch:
 def told_by(backend: Any) -> dict[str, int]:
     """Return the counters of both sides, those of the device as far as it told them."""
     told = backend.counters
-    counters: dict[str, int] = {name: getattr(told, name) for name in HOST}
+    counters: dict[str, int] = {name: getattr(told, name) for name in HOST_COUNTERS}
     health = getattr(backend, "health", None)
     if health is not None:
-        counters |= {name: getattr(health, name) for name in DEVICE}
+        counters |= {name: getattr(health, name) for name in DEVICE_COUNTERS}
     return counters
 
 
 def in_order(counters: Mapping[str, int]) -> list[float]:
-    """Return the counters of HOST, then of DEVICE; NaN for one that was not reported."""
-    return [float(counters.get(name, math.nan)) for name in (*HOST, *DEVICE)]
+    """Return the counters of the host, then of the device; NaN for one that was not reported."""
+    return [float(counters.get(name, math.nan)) for name in (*HOST_COUNTERS, *DEVICE_COUNTERS)]

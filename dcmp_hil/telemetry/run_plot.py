@@ -11,7 +11,7 @@ from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.common.drawing import files_only
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.plot_labels import title
-from dcmp_hil.telemetry.signals import ESTIMATE, TRUE, by_plot
+from dcmp_hil.telemetry.signals import ESTIMATE_RGB, TRUE_RGB, by_plot
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _POINTS_MAX = 20_000
 _BUCKET_COUNT = 4_000  # each keeps its lowest and its highest point
 _PLOT_COLUMNS = 2  # of plots; the first half of the table is on the left
-_GREY = "#4a4f57"
+_TEXT_COLOUR = "#4a4f57"
 _START_ERROR_RATIO = 5.0  # times the largest error of the second half: a start beyond that gets no room
 _DEMAND_CLIP_RATIO = 1.15  # of the largest voltage sent: a demand far beyond it would flatten all else
 
@@ -111,7 +111,7 @@ def _draw_panels(figure: Figure, columns: Columns) -> None:
         if name == "control/tracking_error_mrad":
             _fit_to_second_half(axes)
     for axes in (panels[rows - 1], panels[len(plots) - 1]):  # the lowest of each column
-        axes.set_xlabel("time [s]", fontsize=9, color=_GREY)
+        axes.set_xlabel("time [s]", fontsize=9, color=_TEXT_COLOUR)
         axes.tick_params(labelbottom=True)
 
 
@@ -146,7 +146,7 @@ def _draw_panel(axes: Axes, columns: Columns, signals: list[Signal]) -> None:
 
 def _width(signal: Signal) -> float:
     """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
-    return {TRUE: 3.6, ESTIMATE: 2.2}.get(signal.colour, 1.0)
+    return {TRUE_RGB: 3.6, ESTIMATE_RGB: 2.2}.get(signal.colour, 1.0)
 
 
 def _fit_to_sent(axes: Axes, columns: Columns) -> None:
@@ -166,14 +166,14 @@ def _fit_to_second_half(axes: Axes) -> None:
     whole, half = float(np.nanmax(size)), float(np.nanmax(size[len(size) // 2 :]))
     if half > 0.0 and whole > _START_ERROR_RATIO * half:
         axes.set_ylim(-1.5 * half, 1.5 * half)
-        axes.set_title(f"start beyond the scale: {whole:.4g}", loc="right", fontsize=8.5, color=_GREY)
+        axes.set_title(f"start beyond the scale: {whole:.4g}", loc="right", fontsize=8.5, color=_TEXT_COLOUR)
 
 
 def _dress(axes: Axes, name: str) -> None:
-    axes.set_title(title(name), loc="left", fontsize=10, color=_GREY)
+    axes.set_title(title(name), loc="left", fontsize=10, color=_TEXT_COLOUR)
     axes.grid(visible=True, color="#e3e6ea", linewidth=0.7)
     axes.set_axisbelow(True)
     axes.margins(x=0.0, y=0.08)
-    axes.tick_params(labelsize=8.5, colors=_GREY, length=0)
+    axes.tick_params(labelsize=8.5, colors=_TEXT_COLOUR, length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)

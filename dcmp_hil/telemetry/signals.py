@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.block import Block
 
-TRUE = (125, 145, 165)  # grey-blue: measured or true
-ESTIMATE = (255, 160, 40)  # orange
-REFERENCE = (90, 190, 95)  # green
-ERROR = (240, 80, 80)  # red
-VOLTAGE = (70, 150, 245)  # blue
-DEMAND = (150, 190, 240)  # pale blue
-TIMING = (190, 90, 200)  # purple
-FAINT = (150, 150, 150)
-GRAVITY = (95, 190, 200)  # teal
-FRICTION = (200, 140, 225)  # lilac
-REST = (225, 205, 95)  # yellow
+TRUE_RGB = (125, 145, 165)  # grey-blue: measured or true
+ESTIMATE_RGB = (255, 160, 40)  # orange
+REFERENCE_RGB = (90, 190, 95)  # green
+ERROR_RGB = (240, 80, 80)  # red
+VOLTAGE_RGB = (70, 150, 245)  # blue
+DEMAND_RGB = (150, 190, 240)  # pale blue
+TIMING_RGB = (190, 90, 200)  # purple
+FAINT_RGB = (150, 150, 150)
+GRAVITY_RGB = (95, 190, 200)  # teal
+FRICTION_RGB = (200, 140, 225)  # lilac
+REST_RGB = (225, 205, 95)  # yellow
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,65 +38,77 @@ class Signal:
 
 
 SIGNALS = (
-    Signal("position_rad", "joint/position_rad", "measured", TRUE, lambda b: b["position"]),
-    Signal("position_true_rad", "joint/position_rad", "true (sim)", FAINT, lambda b: b["position_true"]),
+    Signal("position_rad", "joint/position_rad", "measured", TRUE_RGB, lambda b: b["position"]),
+    Signal("position_true_rad", "joint/position_rad", "true (sim)", FAINT_RGB, lambda b: b["position_true"]),
     Signal(
-        "position_estimate_rad", "joint/position_rad", "estimate", ESTIMATE, lambda b: b["position_estimate"]
+        "position_estimate_rad",
+        "joint/position_rad",
+        "estimate",
+        ESTIMATE_RGB,
+        lambda b: b["position_estimate"],
     ),
     Signal(
-        "position_reference_rad", "joint/position_rad", "reference", REFERENCE, lambda b: b.reference[:, 0]
+        "position_reference_rad",
+        "joint/position_rad",
+        "reference",
+        REFERENCE_RGB,
+        lambda b: b.reference[:, 0],
     ),
-    Signal("velocity_true_rad_s", "joint/velocity_rad_s", "true (sim)", TRUE, lambda b: b["velocity_true"]),
+    Signal(
+        "velocity_true_rad_s", "joint/velocity_rad_s", "true (sim)", TRUE_RGB, lambda b: b["velocity_true"]
+    ),
     Signal(
         "velocity_estimate_rad_s",
         "joint/velocity_rad_s",
         "estimate",
-        ESTIMATE,
+        ESTIMATE_RGB,
         lambda b: b["velocity_estimate"],
     ),
     Signal(
         "velocity_reference_rad_s",
         "joint/velocity_rad_s",
         "reference",
-        REFERENCE,
+        REFERENCE_RGB,
         lambda b: b.reference[:, 1],
     ),
     Signal(
         "disturbance_true_rad_s2",
         "joint/disturbance_rad_s2",
         "true (sim)",
-        TRUE,
+        TRUE_RGB,
         lambda b: b["disturbance_true"],
     ),
     Signal(
         "disturbance_estimate_rad_s2",
         "joint/disturbance_rad_s2",
         "estimate",
-        ESTIMATE,
+        ESTIMATE_RGB,
         lambda b: b["disturbance_estimate"],
     ),
-    Signal("gravity_rad_s2", "joint/disturbance_rad_s2", "gravity (model)", GRAVITY, lambda b: b.gravity),
-    Signal("friction_rad_s2", "joint/disturbance_rad_s2", "friction (model)", FRICTION, lambda b: b.friction),
+    Signal("gravity_rad_s2", "joint/disturbance_rad_s2", "gravity (model)", GRAVITY_RGB, lambda b: b.gravity),
+    Signal(
+        "friction_rad_s2", "joint/disturbance_rad_s2", "friction (model)", FRICTION_RGB, lambda b: b.friction
+    ),
     Signal(
         "unexplained_rad_s2",
         "joint/disturbance_rad_s2",
         "rest",
-        REST,
+        REST_RGB,
         lambda b: b["disturbance_estimate"] - b.gravity - b.friction,
     ),
     Signal(
         "tracking_error_mrad",
         "control/tracking_error_mrad",
         "tracking error",
-        ERROR,
+        ERROR_RGB,
         lambda b: 1e3 * b.tracking_error,
     ),
-    Signal("voltage_demand_V", "control/voltage_V", "demanded", DEMAND, lambda b: b["voltage_demand"]),
-    Signal("voltage_sent_V", "control/voltage_V", "sent", FAINT, lambda b: b["voltage_sent"]),
-    Signal("voltage_applied_V", "control/voltage_V", "applied", VOLTAGE, lambda b: b["voltage_applied"]),
-    Signal("period_us", "loop/timing_us", "period", TIMING, lambda b: 1e6 * b["period"]),
-    Signal("lateness_us", "loop/timing_us", "lateness", ERROR, lambda b: 1e6 * b["lateness"]),
-    Signal("compute_us", "loop/timing_us", "compute", FAINT, lambda b: 1e6 * b["compute"]),
+    Signal("voltage_demand_V", "control/voltage_V", "demanded", DEMAND_RGB, lambda b: b["voltage_demand"]),
+    Signal("voltage_sent_V", "control/voltage_V", "sent", FAINT_RGB, lambda b: b["voltage_sent"]),
+    Signal("voltage_applied_V", "control/voltage_V", "applied", VOLTAGE_RGB, lambda b: b["voltage_applied"]),
+    Signal("period_us", "loop/timing_us", "period", TIMING_RGB, lambda b: 1e6 * b["period"]),
+    Signal("lateness_us", "loop/timing_us", "lateness", ERROR_RGB, lambda b: 1e6 * b["lateness"]),
+    Signal("compute_us", "loop/timing_us", "compute", FAINT_RGB, lambda b: 1e6 * b["compute"]),
 )
 
 

@@ -23,7 +23,7 @@ class CorruptFrameError(ValueError):
 
 _COUNTS = 0xFFFFFF  # 24 bits
 _ARM_FLAG, _CLEAR_FLAG, _RELEASE_FLAG = 1, 2, 4
-_STATUS = [(byte & 7, byte & 8 != 0, byte & 16 != 0, byte >> 5) for byte in range(256)]
+_STATUS_FIELDS = [(byte & 7, byte & 8 != 0, byte & 16 != 0, byte >> 5) for byte in range(256)]
 """State, missed, limited and fault class in SAMPLE's byte of status."""
 _DRIVE, _SAMPLE = Struct("<hHHB"), Struct("<HBhBB")
 _take_sample = Struct("<HBhBBx").unpack  # without the crc8: exact lengths are a little faster
@@ -59,7 +59,7 @@ def _pack_sample(sample: SampleReport) -> bytes:
 
 def _unpack_sample(data: bytes) -> SampleReport:
     low, high, voltage_mV, tick, status = _take_sample(data)
-    return make(SampleReport, (low | high << 16, voltage_mV, tick) + _STATUS[status])
+    return make(SampleReport, (low | high << 16, voltage_mV, tick) + _STATUS_FIELDS[status])
 
 
 def _pack_edge(edge: Edge) -> bytes:

@@ -49,13 +49,13 @@ class LinkCounters:
         return replace(self, **grown, device=_growth(self.device, before.device))
 
 
-_COUNTED = ("crc_errors", "sequence_gaps", "ring_overruns", "bus_offs", "late_ticks")
+_COUNTED_EVENTS = ("crc_errors", "sequence_gaps", "ring_overruns", "bus_offs", "late_ticks")
 
 
 def _growth(now: DeviceCounters | None, before: DeviceCounters | None) -> DeviceCounters | None:
     if now is None or before is None:
         return now
-    return replace(now, **{name: getattr(now, name) - getattr(before, name) for name in _COUNTED})
+    return replace(now, **{name: getattr(now, name) - getattr(before, name) for name in _COUNTED_EVENTS})
 
 
 def growth(first: tuple[int, ...], last: tuple[int, ...]) -> DeviceCounters:
@@ -69,9 +69,11 @@ def growth(first: tuple[int, ...], last: tuple[int, ...]) -> DeviceCounters:
     """
     grown = {
         name: newer - older if newer >= older else newer
-        for name, older, newer in zip(_COUNTED, first, last, strict=False)
+        for name, older, newer in zip(_COUNTED_EVENTS, first, last, strict=False)
     }
-    full = tuple(name for name, newer in zip(_COUNTED, last, strict=False) if newer >= HEALTH_COUNTER_MAX)
+    full = tuple(
+        name for name, newer in zip(_COUNTED_EVENTS, last, strict=False) if newer >= HEALTH_COUNTER_MAX
+    )
     return DeviceCounters(**grown, full=full)
 
 

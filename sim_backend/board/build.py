@@ -14,10 +14,13 @@ from dcmp_hil.errors import OpenError
 from sim_backend.board import build_cache
 
 _PACKAGE_ROOT = Path(__file__).parents[1]
-_PLACES = (_PACKAGE_ROOT / "firmware", _PACKAGE_ROOT.parent / "firmware")  # in the wheel; in a checkout
-_FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
+_SOURCE_FOLDERS = (  # in the wheel; in a checkout
+    _PACKAGE_ROOT / "firmware",
+    _PACKAGE_ROOT.parent / "firmware",
+)
+_COMPILER_FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
 _COMPILE_TIMEOUT_S = 120
-_INSTALL = "apt install gcc libc6-dev"
+_INSTALL_REMEDY = "apt install gcc libc6-dev"
 
 
 def library() -> Path:
@@ -50,22 +53,24 @@ def sources() -> Path:
     OpenError
         If they were not installed.
     """
-    for folder in _PLACES:
+    for folder in _SOURCE_FOLDERS:
         if (folder / "core").is_dir():
             return folder
-    raise OpenError(f"{_PLACES[0]}: the firmware's sources are missing. Install dcmp-hil again.")
+    raise OpenError(f"{_SOURCE_FOLDERS[0]}: the firmware's sources are missing. Install dcmp-hil again.")
 
 
 def _built(board: str, name: str, flags: tuple[str, ...]) -> Path:
     root = sources()
     files = sorted([*root.glob("core/*.[ch]"), *root.glob(f"boards/{board}/*.[ch]")])
     compiler = _compiler()
-    key = hashlib.sha256(repr((compiler, _version(compiler), _FLAGS, flags)).encode())
+    key = hashlib.sha256(repr((compiler, _version(compiler), _COMPILER_FLAGS, flags)).encode())
     for file in files:
         key.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
     with build_cache.folder(key.hexdigest()[:16]) as folder:
         found = build_cache.find(folder, name)
-        return found or _compile([*compiler, *_FLAGS, *flags, f"-I{root / 'core'}"], files, folder, name)
+        return found or _compile(
+            [*compiler, *_COMPILER_FLAGS, *flags, f"-I{root / 'core'}"], files, folder, name
+        )
 
 
 def _compiler() -> list[str]:
@@ -77,7 +82,7 @@ def _compiler() -> list[str]:
         return asked
     found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
     if found is None:
-        raise OpenError(f"The virtual device needs a C compiler, and there is none: {_INSTALL}")
+        raise OpenError(f"The virtual device needs a C compiler, and there is none: {_INSTALL_REMEDY}")
     return [found]
 
 
@@ -108,7 +113,8 @@ def _run(command: list[str]) -> str:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise OpenError(
-            f"{command[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: {_INSTALL}"
+            f"{command[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: "
+            f"{_INSTALL_REMEDY}"
         ) from error
     if done.returncode < 0:
         raise OpenError(
@@ -120,6 +126,6 @@ def _run(command: list[str]) -> str:
         ]
         raise OpenError(
             f"{command[0]}: the virtual device does not compile: {said[0]}. "
-            f"If it is a header that is missing: {_INSTALL}"
+            f"If it is a header that is missing: {_INSTALL_REMEDY}"
         )
     return done.stdout

@@ -74,7 +74,7 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, needs_compiler: No
         path = tmp_path / "firmware" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text + "\n")
-    monkeypatch.setattr("sim_backend.board.build._PLACES", (tmp_path / "firmware",))
+    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (tmp_path / "firmware",))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return build.program
 

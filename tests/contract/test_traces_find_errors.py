@@ -205,8 +205,8 @@ def test_the_traces_find_an_error_in_the_core(
     text = (root / file).read_text()
     assert text.count(old) == 1
     (root / file).write_text(text.replace(old, new))
-    monkeypatch.setattr(build, "_PLACES", (root,))
-    monkeypatch.setattr(build, "_FLAGS", ("-std=c11", "-O0"))
+    monkeypatch.setattr(build, "_SOURCE_FOLDERS", (root,))
+    monkeypatch.setattr(build, "_COMPILER_FLAGS", ("-std=c11", "-O0"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     hostlib.load.cache_clear()
     try:

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from dcmp_hil.telemetry.rerun import viewer as window
-from dcmp_hil.telemetry.signals import ERROR, VOLTAGE
+from dcmp_hil.telemetry.signals import ERROR_RGB, VOLTAGE_RGB
 from tests.live.processes import own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
 from tests.panel.test_browser import address_of, free_port
@@ -50,8 +50,8 @@ def test_the_dashboard_is_drawn_in_the_panel(tmp_path: Path) -> None:
         until(lambda: window.served(_FIRST), "the run was served")
         with started(tmp_path, "panel", "--web", "--port", str(free_port()), first=_FIRST) as panel:
             page.get(address_of(panel))
-            until(lambda: _coloured(page, VOLTAGE) > 50, "the voltage was drawn")
-            until(lambda: _coloured(page, ERROR) > 50, "the tracking error was drawn")
+            until(lambda: _coloured(page, VOLTAGE_RGB) > 50, "the voltage was drawn")
+            until(lambda: _coloured(page, ERROR_RGB) > 50, "the tracking error was drawn")
             _REPORTS.mkdir(exist_ok=True)
             page.save_screenshot(str(_REPORTS / "panel-web.png"))
             page.find_element("id", "stop").click()

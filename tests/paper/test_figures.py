@@ -13,16 +13,16 @@ from matplotlib.image import imread
 from dcmp_hil import ConfigError, paper
 from dcmp_hil.paper import Reproduction, draw
 from dcmp_hil.paper.panels import FIGURES, series
-from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, REFERENCE, TRUE, VOLTAGE
+from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, REFERENCE_RGB, TRUE_RGB, VOLTAGE_RGB
 from tests.cli.conftest import Outcome
 
 Cli = Callable[..., Outcome]
 
 COLOURS = {
-    "figure-1-state.png": (TRUE, ESTIMATE),
-    "figure-2-estimation-error.png": (ERROR,),
-    "figure-3-tracking.png": (TRUE, REFERENCE, ERROR),
-    "figure-4-control.png": (VOLTAGE, TRUE, ESTIMATE),
+    "figure-1-state.png": (TRUE_RGB, ESTIMATE_RGB),
+    "figure-2-estimation-error.png": (ERROR_RGB,),
+    "figure-3-tracking.png": (TRUE_RGB, REFERENCE_RGB, ERROR_RGB),
+    "figure-4-control.png": (VOLTAGE_RGB, TRUE_RGB, ESTIMATE_RGB),
 }
 
 

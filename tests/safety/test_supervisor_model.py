@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
+from dcmp_hil.safety.supervisor import TRANSITIONS, Phase, PhaseEvent
 
 Table = dict[Phase, dict[PhaseEvent, Phase]]
 Path = tuple[Phase, ...]
@@ -18,7 +18,7 @@ ORDER = [
 
 
 def table() -> Table:
-    return {phase: dict(events) for phase, events in TABLE.items()}
+    return {phase: dict(events) for phase, events in TRANSITIONS.items()}
 
 
 def paths(of: Table) -> list[Path]:

@@ -32,7 +32,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text + "\n")
-    monkeypatch.setattr("sim_backend.board.build._PLACES", (tmp_path / "nowhere", root))
+    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (tmp_path / "nowhere", root))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return root
 
@@ -68,7 +68,7 @@ def test_changed_source_header_or_compiler_is_compiled_anew(
 def test_two_processes_at_once_get_one_whole_program_each(tree: Path) -> None:
     code = (
         "import pathlib, sys\nfrom sim_backend.board import build\n"
-        f"build._PLACES = (pathlib.Path({str(tree)!r}),)\n"
+        f"build._SOURCE_FOLDERS = (pathlib.Path({str(tree)!r}),)\n"
         "print(build.program())"
     )
     running = [

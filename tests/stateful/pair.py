@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
+from dcmp_hil.safety.supervisor import TRANSITIONS, Phase, PhaseEvent
 from tests.stateful.device_model import Command, Device, Rules, State
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Model:
     def __init__(
         self,
         rules: Rules = SMALL,
-        table: Mapping[Phase, Mapping[PhaseEvent, Phase]] = TABLE,
+        table: Mapping[Phase, Mapping[PhaseEvent, Phase]] = TRANSITIONS,
         *,
         deaf: bool = False,
     ) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent
+from dcmp_hil.safety.supervisor import TRANSITIONS, Phase, PhaseEvent
 from tests.stateful.device_model import NEXT, Command, Device, Rules, State
 from tests.stateful.pair import SMALL, Model, search, stuck
 
@@ -70,7 +70,7 @@ class NoEdge(Rules):
 
 
 def _host(phase: Phase, event: PhaseEvent, following: Phase) -> Mapping[Phase, Mapping[PhaseEvent, Phase]]:
-    changed = {here: dict(events) for here, events in TABLE.items()}
+    changed = {here: dict(events) for here, events in TRANSITIONS.items()}
     changed[phase][event] = following
     return changed
 

@@ -13,7 +13,7 @@ from dcmp_hil.device.backend import DeviceBackend
 from dcmp_hil.device.disarm import DisarmSequence
 from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import FiniteMonitor
-from dcmp_hil.safety.supervisor import TABLE, Phase, PhaseEvent, Supervisor
+from dcmp_hil.safety.supervisor import TRANSITIONS, Phase, PhaseEvent, Supervisor
 from dcmp_hil.values import Fault
 from sim_backend.board import build, hostlib
 from tests.stateful.machine import Machine
@@ -34,9 +34,9 @@ pytestmark = pytest.mark.usefixtures("untraced")
 
 
 def _table(phase: Phase, event: PhaseEvent, following: Phase) -> Callable[[Patch], None]:
-    changed = {here: dict(events) for here, events in TABLE.items()}
+    changed = {here: dict(events) for here, events in TRANSITIONS.items()}
     changed[phase][event] = following
-    return lambda patch: patch.setattr("dcmp_hil.safety.supervisor.TABLE", changed)
+    return lambda patch: patch.setattr("dcmp_hil.safety.supervisor.TRANSITIONS", changed)
 
 
 def _method(kind: type, name: str, other: Any) -> Callable[[Patch], None]:
@@ -124,8 +124,8 @@ def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str
         path.write_text(text.replace(old, new))
         hostlib.load.cache_clear()
 
-    monkeypatch.setattr("sim_backend.board.build._PLACES", (root,))
-    monkeypatch.setattr("sim_backend.board.build._FLAGS", ("-std=c11", "-O1"))
+    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (root,))
+    monkeypatch.setattr("sim_backend.board.build._COMPILER_FLAGS", ("-std=c11", "-O1"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     yield sow
     hostlib.load.cache_clear()

@@ -16,7 +16,7 @@ from dcmp_hil.platform.clock import pause
 from dcmp_hil.telemetry.rerun import sink as rerun_sink
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.sink import RerunSink
-from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, VOLTAGE
+from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, VOLTAGE_RGB
 from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
 from tools import screenshot as screenshots
 from tools.screenshot import APT, headless_viewer, look, screenshot, wait_until_loaded
@@ -107,7 +107,7 @@ def test_a_recording_opens_right_without_a_click(tmp_path: Path) -> None:
     assert seen.complaints == []
     (recording,) = [r for r in seen.state.recordings if r.store_id == seen.state.active_recording]
     assert (recording.current_timeline, recording.current_time) == ("loop_time", 2_000_000_000)
-    for colour in (ESTIMATE, VOLTAGE, ERROR):
+    for colour in (ESTIMATE_RGB, VOLTAGE_RGB, ERROR_RGB):
         assert coloured(tmp_path / "run.png", colour) > 100
 
 
@@ -137,7 +137,7 @@ def test_a_live_run_reaches_the_viewer_and_only_loopback_is_bound(served: RerunS
     assert seen.complaints == []
     assert addresses
     assert addresses <= _LOOPBACK
-    assert coloured(tmp_path / "live.png", ESTIMATE) > 100
+    assert coloured(tmp_path / "live.png", ESTIMATE_RGB) > 100
 
 
 _FROZEN = """

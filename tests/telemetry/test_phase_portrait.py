@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.control.model import Model
 from dcmp_hil.telemetry.block import Block
-from dcmp_hil.telemetry.link_events import DEVICE, HOST, LinkWatch, in_order
+from dcmp_hil.telemetry.link_events import DEVICE_COUNTERS, HOST_COUNTERS, LinkWatch, in_order
 from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns
@@ -97,7 +97,7 @@ def test_thinning_keeps_the_order_of_peaks_and_ignores_nan() -> None:
 
 def _counters(event: Event) -> dict[str, float]:
     assert isinstance(event.data, LinkData)
-    return dict(zip((*HOST, *DEVICE), in_order(event.data.counters), strict=True))
+    return dict(zip((*HOST_COUNTERS, *DEVICE_COUNTERS), in_order(event.data.counters), strict=True))
 
 
 def test_link_is_told_of_once_a_second_and_only_where_there_is_one() -> None:
@@ -109,7 +109,7 @@ def test_link_is_told_of_once_a_second_and_only_where_there_is_one() -> None:
     assert [event.t for event in told] == pytest.approx([0.999, 1.999])
     assert {event.kind for event in told} == {EventKind.LINK}
     counts = _counters(told[0])
-    assert list(counts) == [*HOST, *DEVICE]
+    assert list(counts) == [*HOST_COUNTERS, *DEVICE_COUNTERS]
     assert (counts["lost"], counts["corrupt"]) == (3.0, 1.0)
     assert np.isnan(counts["crc_errors"])
     backend.health = Health(7, 0, 0, 0, 2, 90)

@@ -15,7 +15,7 @@ from tests.telemetry.runs import feed
 pytest.importorskip("matplotlib")
 
 from dcmp_hil.telemetry.run_plot import draw_run, thinned
-from dcmp_hil.telemetry.signals import ESTIMATE, REFERENCE
+from dcmp_hil.telemetry.signals import ESTIMATE_RGB, REFERENCE_RGB
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +33,7 @@ def colours(path: Path) -> set[tuple[int, ...]]:
 @pytest.mark.parametrize("known", [True, False])
 def test_a_run_is_drawn_in_the_dashboard_s_colours(known: bool, tmp_path: Path) -> None:
     draw_run(feed(MemorySink(), known=known), "synthetic", tmp_path / "run.png")
-    assert {ESTIMATE, REFERENCE} <= colours(tmp_path / "run.png")
+    assert {ESTIMATE_RGB, REFERENCE_RGB} <= colours(tmp_path / "run.png")
 
 
 def test_long_runs_keep_their_peaks() -> None:

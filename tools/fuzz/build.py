@@ -14,12 +14,12 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "firmware" / "core"
 TARGET = ROOT / "firmware" / "fuzz"
 
-_MISSING = "libFuzzer is missing here: apt install --no-install-recommends clang libclang-rt-dev"
-_C = ("-std=c11", "-D_POSIX_C_SOURCE=200809L", "-g", f"-I{CORE}", "-w")
+_MISSING_REMEDY = "libFuzzer is missing here: apt install --no-install-recommends clang libclang-rt-dev"
+_C_FLAGS = ("-std=c11", "-D_POSIX_C_SOURCE=200809L", "-g", f"-I{CORE}", "-w")
 # What the core compares is of no use to mutations, since its frames are made with their checksums: counting
 # edges alone is what makes the difference between 17,000 and 50,000 executions a second.
-_COUNTED = ("-fsanitize-coverage=inline-8bit-counters,pc-table",)
-_CHECKED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+_COUNTED_FLAGS = ("-fsanitize-coverage=inline-8bit-counters,pc-table",)
+_CHECKED_FLAGS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 _Job = tuple[Path, tuple[str, ...]]  # a file and how it is compiled
 
@@ -57,11 +57,11 @@ def clang() -> str:
     """
     found = shutil.which("clang")
     if found is None:
-        raise RuntimeError(_MISSING)
+        raise RuntimeError(_MISSING_REMEDY)
     probe = [found, "-fsanitize=fuzzer,address,undefined", "-x", "c", "-", "-o", os.devnull]
     target = "int LLVMFuzzerTestOneInput(const unsigned char *d, unsigned long n) { return !d && n; }"
     if subprocess.run(probe, input=target, text=True, capture_output=True, check=False).returncode:  # noqa: S603
-        raise RuntimeError(_MISSING)
+        raise RuntimeError(_MISSING_REMEDY)
     return found
 
 
@@ -76,7 +76,7 @@ def target_files() -> list[Path]:
 
 
 def _compile(compiler: str, source: Path, flags: tuple[str, ...], target: Path) -> Path:
-    subprocess.run([compiler, *_C, *flags, "-c", str(source), "-o", str(target)], check=True)  # noqa: S603
+    subprocess.run([compiler, *_C_FLAGS, *flags, "-c", str(source), "-o", str(target)], check=True)  # noqa: S603
     return target
 
 
@@ -92,7 +92,7 @@ class Workshop:
     def __init__(self, folder: Path, jobs: int = 2) -> None:
         self._folder = folder
         self._clang = clang()
-        jobs_of: list[_Job] = [(path, (*_COUNTED, *_CHECKED, "-O2")) for path in core_files()]
+        jobs_of: list[_Job] = [(path, (*_COUNTED_FLAGS, *_CHECKED_FLAGS, "-O2")) for path in core_files()]
         jobs_of += [(path, ("-O2",)) for path in target_files()]  # what is not under test pays for no checks
         with ThreadPoolExecutor(jobs) as pool:
             made = pool.map(
@@ -107,13 +107,13 @@ class Workshop:
             source = self._folder / f"{name}.{edit.file}"
             source.write_text(edit.made(), "utf-8")
             objects[edit.file] = _compile(
-                self._clang, source, (*_COUNTED, *_CHECKED, "-O2"), self._folder / f"{name}.o"
+                self._clang, source, (*_COUNTED_FLAGS, *_CHECKED_FLAGS, "-O2"), self._folder / f"{name}.o"
             )
         program = self._folder / name
         command = [
             self._clang,
             "-fsanitize=fuzzer",
-            *_CHECKED,
+            *_CHECKED_FLAGS,
             *map(str, objects.values()),
             "-o",
             str(program),

@@ -22,7 +22,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "+=": ("-=", "="), "-=": ("+=", "="), "++": ("--",), "--": ("++",),
 }  # fmt: skip
 _NUMBER = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)\b")
-_REMARK = re.compile(r"/\*.*?\*/", re.DOTALL)
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
 class Change(NamedTuple):
@@ -118,7 +118,7 @@ def _condition(node: Node) -> Iterator[Change]:
 
 def _numbers(node: Node) -> Iterator[Change]:
     """Put one more for a number, and 0 for 1."""
-    remarks_blank = _REMARK.sub(lambda remark: " " * len(remark[0]), text_of(node))
+    remarks_blank = _COMMENT.sub(lambda remark: " " * len(remark[0]), text_of(node))
     for found in _NUMBER.finditer(remarks_blank):
         digits, suffix = found.groups()
         value = int(digits, 0)
@@ -175,7 +175,7 @@ def _place(node: Node) -> str:
 
 
 def _plain(text: bytes) -> str:
-    return " ".join(_REMARK.sub(" ", text.decode()).split())
+    return " ".join(_COMMENT.sub(" ", text.decode()).split())
 
 
 def mutants(path: Path) -> list[Mutant]:

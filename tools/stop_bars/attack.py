@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _ATTEMPTS_MAX = 10
-_BUSY = ("device_fault", "SampleTimeoutError", "DeadlineError")  # a computer that is busy ended it first
+_BUSY_ENDINGS = ("device_fault", "SampleTimeoutError", "DeadlineError")  # a busy computer ended it first
 
 
 def attack(kind: str, way: str) -> Bar:
@@ -41,7 +41,7 @@ def attack(kind: str, way: str) -> Bar:
                 continue  # a busy computer: its device's watchdog was faster
             press = stack.enter_context(serve_panel(host.pid)) if way == "panel" else None
             bar = None if host.process.poll() is not None else _stop(host, kind, way, press)
-            if bar is not None and bar.ended_by not in _BUSY:
+            if bar is not None and bar.ended_by not in _BUSY_ENDINGS:
                 return bar
     why = f"{_ATTEMPTS_MAX} runs ended before they were stopped, the last one: {said}"
     return Bar(kind, way, 0.0, 0.0, "", "", 0, (why,))

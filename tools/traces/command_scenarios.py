@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tools.traces.steps import OURS, THEIRS
+from tools.traces.steps import OTHER_SESSION, OUR_SESSION
 
 if TYPE_CHECKING:
     from tools.traces.steps import Recorder
@@ -56,7 +56,7 @@ def gap(host: Recorder) -> None:
     host.drive(1500)
     host.drive(1600)
     host.drive(1700, back=1)
-    host.drive(1800, session=THEIRS)
+    host.drive(1800, session=OTHER_SESSION)
     host.tick()
     host.drive(1900, ttl_ms=4)
     host.drive(1900, clear=True)
@@ -72,7 +72,7 @@ def watchdog(host: Recorder) -> None:
     for _ in range(23):  # none of these is an accepted DRIVE
         host.tick()
         host.drive(2000, back=30)
-        host.drive(2000, session=THEIRS)
+        host.drive(2000, session=OTHER_SESSION)
         host.hello()
     host.drive(arm=False)
     host.tick()
@@ -113,14 +113,14 @@ def stop_and_clear(host: Recorder) -> None:
     host.tick()
     host.drive(arm=False, release=True)
     host.tick()
-    host.hello(THEIRS)
-    host.drive(arm=False, clear=True, session=THEIRS)
+    host.hello(OTHER_SESSION)
+    host.drive(arm=False, clear=True, session=OTHER_SESSION)
     host.tick()
-    host.drive(arm=False, session=THEIRS)
+    host.drive(arm=False, session=OTHER_SESSION)
     host.tick(times=100)
-    host.drive(arm=False, clear=True, session=THEIRS)
+    host.drive(arm=False, clear=True, session=OTHER_SESSION)
     host.tick()
-    host.drive(session=OURS)
+    host.drive(session=OUR_SESSION)
     host.tick()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dcmp_hil.wire.messages import Parameter
-from tools.traces.steps import THEIRS
+from tools.traces.steps import OTHER_SESSION
 
 if TYPE_CHECKING:
     from tools.traces.steps import Recorder
@@ -121,12 +121,12 @@ def limits_end(host: Recorder) -> None:
     host.run(4, 2500, moved=1)
     host.drive(arm=False, release=True)
     host.tick()
-    host.hello(THEIRS)
+    host.hello(OTHER_SESSION)
     for _ in range(10):
-        host.drive(session=THEIRS)
+        host.drive(session=OTHER_SESSION)
         host.tick()
     for _ in range(4):
-        host.drive(2500, session=THEIRS)
+        host.drive(2500, session=OTHER_SESSION)
         host.tick(30)
 
 

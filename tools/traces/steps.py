@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.frame import Frame
 
-OURS, THEIRS = 0x1234, 0x4321
+OUR_SESSION, OTHER_SESSION = 0x1234, 0x4321
 FAULT, SAMPLE = 3, 4
 REPORTED = (FAULT, SAMPLE)
 """Numbers of the messages that a trace has: IDENTITY and HEALTH have fields of the board's own."""
@@ -124,7 +124,7 @@ class Recorder:
             self.ticks += 1
             self._play({"tick": self.ticks, "counts": self.counts % 2**24})
 
-    def hello(self, session: int = OURS) -> None:
+    def hello(self, session: int = OUR_SESSION) -> None:
         """Ask to own the device."""
         self._send(Hello(session, PROTOCOL_HASH), f"HELLO of {session:04X}")
 
@@ -136,7 +136,7 @@ class Recorder:
         clear: bool = False,
         release: bool = False,
         back: int = 0,
-        session: int = OURS,
+        session: int = OUR_SESSION,
         ttl_ms: int = 50,
         spoilt: bool = False,
     ) -> None:
@@ -153,7 +153,7 @@ class Recorder:
         """Send STOP."""
         self._send(Stop(reason), f"STOP, reason {reason}")
 
-    def put(self, parameter: Parameter, value: int, session: int = OURS) -> None:
+    def put(self, parameter: Parameter, value: int, session: int = OUR_SESSION) -> None:
         """Set a parameter."""
         self._send(ParameterSet(session, parameter, value), f"PARAMETER_SET {parameter.name} {value}")
 

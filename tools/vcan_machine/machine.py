@@ -24,13 +24,13 @@ CONSOLE = "console.txt"  # in the shared folder: what was printed
 _RUN_TIMEOUT_S = 1200  # wall, on a computer that does much else: nothing may take longer
 _KILL_DELAY_S = 5
 _SHOWN_CONSOLE_CHARS = 2000  # characters of the console that an error shows
-_KEPT = ("PATH", "HOME", "LANG", "XDG_CACHE_HOME", "CC")
+_KEPT_VARIABLES = ("PATH", "HOME", "LANG", "XDG_CACHE_HOME", "CC")
 
 # Time in the machine is counted in its instructions, 1 ns each, and stands still while it computes nothing
 # and waits for a timer: however busy this computer is, nothing in there comes late.
-_MACHINE = shlex.split("-M microvm,rtc=on -accel tcg -cpu max -icount shift=0,sleep=off -m 1024")
-_PLAIN = shlex.split("-no-user-config -nodefaults -nographic -no-reboot -serial stdio")
-_KERNEL = "console=ttyS0 quiet panic=-1 mitigations=off audit=0 random.trust_cpu=on"
+_MACHINE_OPTIONS = shlex.split("-M microvm,rtc=on -accel tcg -cpu max -icount shift=0,sleep=off -m 1024")
+_PLAIN_OPTIONS = shlex.split("-no-user-config -nodefaults -nographic -no-reboot -serial stdio")
+_KERNEL_OPTIONS = "console=ttyS0 quiet panic=-1 mitigations=off audit=0 random.trust_cpu=on"
 
 
 class Machine(NamedTuple):
@@ -101,7 +101,7 @@ def run(command: Sequence[str], share: Path, *, folder: Path, settings: Mapping[
         If the machine did not come to its end in time.
     """
     made = machine()
-    passed_on = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    passed_on = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
     exports = "".join(f"export {n}={shlex.quote(v)}\n" for n, v in {**passed_on, **settings}.items())
     script = f"cd {shlex.quote(str(folder))} || exit\n{exports}exec {shlex.join(command)}\n"
     (share / SCRIPT).write_text(script)
@@ -132,9 +132,9 @@ def _start(qemu: list[str], console: Path) -> None:
 def _qemu(made: Machine, share: Path) -> list[str]:
     return [
         QEMU,
-        *_MACHINE,
-        *_PLAIN,
-        *("-kernel", str(made.kernel), "-initrd", str(made.initramfs), "-append", _KERNEL),
+        *_MACHINE_OPTIONS,
+        *_PLAIN_OPTIONS,
+        *("-kernel", str(made.kernel), "-initrd", str(made.initramfs), "-append", _KERNEL_OPTIONS),
         *_shared(HOST, Path("/"), "readonly=on,multidevs=remap"),
         *_shared(SHARE, share.resolve(), "multidevs=remap"),
     ]

@@ -34,7 +34,7 @@ FAILURES = (
 )
 """What interfaces of python-can raise when they fail; the last two come from ports that are closed."""
 
-_NETWORKED = ("socketcand", "udp_multicast")
+_NETWORK_DRIVERS = ("socketcand", "udp_multicast")
 _BLOCKING_INTERFACES = (
     "robotell",
     "seeedstudio",
@@ -246,7 +246,7 @@ def _open_bus(settings: CanSettings, *, listen_only: bool) -> can.BusABC:
 
 def _check_interface(settings: CanSettings) -> None:
     interface = settings.interface
-    if interface in _NETWORKED:
+    if interface in _NETWORK_DRIVERS:
         raise ConfigError(
             f'backend.interface: "{interface}" reaches over the network; a motor is driven from the machine '
             "that it is plugged into."

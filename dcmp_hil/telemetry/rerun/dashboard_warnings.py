@@ -25,7 +25,7 @@ _FULL_DISK_NOTE = (
     "{file} {what}: less than {needed:.3g} MB are free on its disk, and the data in run.mcap come first. "
     "The run goes on. Free some space; `dcmp-hil export FOLDER --rrd FILE` makes the dashboard afterwards."
 )
-STRANGERS = (
+OTHER_USERS_WARNING = (
     "Another user of this computer (number {user}) connected to the dashboard on port {port}: it is not "
     "served any more. The run and its files go on, and take nothing from a viewer."
 )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PATH, RELATIVE = "params", "params_over_start"
 """Entities: the table, with each number below it; all of them on one axis."""
-_TUNED = ("controller.", "observer.", "reference.")
+_TUNED_KEYS = ("controller.", "observer.", "reference.")
 
 
 class Parameters:
@@ -55,7 +55,7 @@ class Parameters:
     def numbers(self) -> Iterator[tuple[str, float]]:
         """Yield the name and value of each tunable number."""
         for key, value in self._numbers.items():
-            if key.startswith(_TUNED) and math.isfinite(value):
+            if key.startswith(_TUNED_KEYS) and math.isfinite(value):
                 yield key, value
 
     def take(self, event: Event) -> dict[str, float] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.signals import ESTIMATE, REFERENCE
+from dcmp_hil.telemetry.signals import ESTIMATE_RGB, REFERENCE_RGB
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,8 +80,8 @@ class Portrait:
             self._reach = reach
             calls += _axes(*reach)
         for name, columns, colour, radius in (
-            ("reference", (3, 4), REFERENCE, 0.018),
-            ("estimate", (1, 2), ESTIMATE, 0.008),
+            ("reference", (3, 4), REFERENCE_RGB, 0.018),
+            ("estimate", (1, 2), ESTIMATE_RGB, 0.008),
         ):
             strip = self._scaled(self.points[:, columns])
             lines = rr.LineStrips2D.columns(strips=[strip], colors=[colour], radii=[radius])

@@ -60,7 +60,7 @@ class RigView:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-_FIRST = ("controller", "observer", "reference", "loop")  # what is tuned is visible without scrolling
+_FIRST_KEYS = ("controller", "observer", "reference", "loop")  # what is tuned is visible without scrolling
 
 
 def view_of(rig: Rig) -> RigView:
@@ -105,4 +105,4 @@ def _about() -> tuple[tuple[str, str], ...]:
 
 def _place(row: tuple[str, str]) -> int:
     table = row[0].partition(".")[0]
-    return _FIRST.index(table) if table in _FIRST else len(_FIRST)
+    return _FIRST_KEYS.index(table) if table in _FIRST_KEYS else len(_FIRST_KEYS)

@@ -7,9 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.link_events import DEVICE, HOST
+from dcmp_hil.telemetry.link_events import DEVICE_COUNTERS, HOST_COUNTERS
 from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
-from dcmp_hil.telemetry.signals import DEMAND, ERROR, ESTIMATE, FAINT, REFERENCE, TIMING, TRUE, VOLTAGE
+from dcmp_hil.telemetry.signals import (
+    DEMAND_RGB,
+    ERROR_RGB,
+    ESTIMATE_RGB,
+    FAINT_RGB,
+    REFERENCE_RGB,
+    TIMING_RGB,
+    TRUE_RGB,
+    VOLTAGE_RGB,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,31 +31,31 @@ if TYPE_CHECKING:
 ARM, GHOST = "rig/arm", "rig/reference"
 LIMITS, LINK = "control/voltage_V/limit", "link/counters"
 HISTOGRAMS = {
-    "period": ("loop/period_hist", 0.5, 1.5, TIMING),
-    "lateness": ("loop/lateness_hist", 0.0, 0.5, ERROR),
-    "compute": ("loop/compute_hist", 0.0, 0.5, FAINT),
+    "period": ("loop/period_hist", 0.5, 1.5, TIMING_RGB),
+    "lateness": ("loop/lateness_hist", 0.0, 0.5, ERROR_RGB),
+    "compute": ("loop/compute_hist", 0.0, 0.5, FAINT_RGB),
 }
 """Entities of the histograms by field, with bounds in periods and colour."""
 LANES = {
     "phase": {
-        "probing": FAINT,
-        "settling": FAINT,
-        "engaging": ESTIMATE,
-        "running": REFERENCE,
-        "tripped": ERROR,
+        "probing": FAINT_RGB,
+        "settling": FAINT_RGB,
+        "engaging": ESTIMATE_RGB,
+        "running": REFERENCE_RGB,
+        "tripped": ERROR_RGB,
     },
-    "voltage": {"within limits": VOLTAGE, "at the limit": ERROR},
-    "samples": {"on time": TIMING, "late": ERROR},
+    "voltage": {"within limits": VOLTAGE_RGB, "at the limit": ERROR_RGB},
+    "samples": {"on time": TIMING_RGB, "late": ERROR_RGB},
 }
 """Lanes of the timeline of states, with the colour of each state."""
 
 _LINE_WIDTHS_POINTS = {
-    TRUE: 5.0,
-    ESTIMATE: 3.2,
-    REFERENCE: 1.6,
-    FAINT: 1.0,
-    DEMAND: 1.0,
-    VOLTAGE: 1.6,
+    TRUE_RGB: 5.0,
+    ESTIMATE_RGB: 3.2,
+    REFERENCE_RGB: 1.6,
+    FAINT_RGB: 1.0,
+    DEMAND_RGB: 1.0,
+    VOLTAGE_RGB: 1.6,
 }
 _SERIES_COLOURS = (
     *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
@@ -72,7 +81,10 @@ def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
         style = rr.SeriesLines(names=["limit", "limit"], colors=[(130, 60, 60)] * 2, widths=[1.0] * 2)
         stream.log(LIMITS, style, static=True)
     if rig.wired:
-        names = [*(f"host: {name}" for name in HOST), *(f"device: {name}" for name in DEVICE)]
+        names = [
+            *(f"host: {name}" for name in HOST_COUNTERS),
+            *(f"device: {name}" for name in DEVICE_COUNTERS),
+        ]
         style = rr.SeriesLines(names=[name.replace("_", " ") for name in names], widths=[1.6] * len(names))
         stream.log(LINK, style, static=True)
     for lane, states in LANES.items():
@@ -169,7 +181,7 @@ def _log_arm(stream: rr.RecordingStream) -> None:
         radii=[0.045],
         translations=[(0, 0, _ARM_DEPTH)],
         rotation_axis_angles=[rr.RotationAxisAngle(axis=(1, 0, 0), degrees=90)],
-        colors=[TRUE],
+        colors=[TRUE_RGB],
         fill_mode="Solid",
     )
     stream.log(f"{ARM}/rod", rod, static=True)
@@ -185,7 +197,7 @@ def _log_arm(stream: rr.RecordingStream) -> None:
             [(0, 0, _ARM_DEPTH), (0, -1.14, _ARM_DEPTH)],
             _circle(0.17, 0.0) + np.array([0.0, -_ARM_LENGTH, _ARM_DEPTH]),
         ],
-        colors=[REFERENCE],
+        colors=[REFERENCE_RGB],
         radii=[0.010],
     )
     stream.log(f"{GHOST}/outline", outline, static=True)

@@ -13,7 +13,14 @@ import rerun.blueprint as rrb
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.rerun.blueprint import TIMELINE, opened, plot
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
-from dcmp_hil.telemetry.signals import ERROR, ESTIMATE, FAINT, REFERENCE, TRUE, VOLTAGE
+from dcmp_hil.telemetry.signals import (
+    ERROR_RGB,
+    ESTIMATE_RGB,
+    FAINT_RGB,
+    REFERENCE_RGB,
+    TRUE_RGB,
+    VOLTAGE_RGB,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,15 +29,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _STYLES = {
-    "measured": (TRUE, 4.5),
-    "true": (TRUE, 4.5),
-    "given": (FAINT, 1.0),
-    "estimate": (ESTIMATE, 2.8),
-    "reference": (REFERENCE, 1.2),
-    "error": (ERROR, 1.2),
-    "applied": (VOLTAGE, 1.6),
+    "measured": (TRUE_RGB, 4.5),
+    "true": (TRUE_RGB, 4.5),
+    "given": (FAINT_RGB, 1.0),
+    "estimate": (ESTIMATE_RGB, 2.8),
+    "reference": (REFERENCE_RGB, 1.2),
+    "error": (ERROR_RGB, 1.2),
+    "applied": (VOLTAGE_RGB, 1.6),
 }
-_OTHER_COLOURS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT)
+_OTHER_COLOURS = ((190, 90, 200), (90, 200, 200), (220, 210, 90), FAINT_RGB)
 _FLUSH_TIMEOUT_S = 30.0  # s
 _PLOT_TIMEOUT_S = 40.0  # s for one plot
 

@@ -19,7 +19,7 @@ from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.dashboard_warnings import (
     NO_ROOM,
     NO_WINDOW,
-    STRANGERS,
+    OTHER_USERS_WARNING,
     incomplete,
     spared,
     stuck,
@@ -175,7 +175,7 @@ class RerunSink:
         """End the server where another user is connected to it: Rerun does not authenticate its clients."""
         if self.port is None or not (users := strangers(self.port)):
             return
-        self.warnings.append(STRANGERS.format(user=users[0], port=self.port))
+        self.warnings.append(OTHER_USERS_WARNING.format(user=users[0], port=self.port))
         self.port = None
         for feed in [one for one in self._feeds if one.outlet.file is None]:
             feed.outlet.farewell = lambda: None
