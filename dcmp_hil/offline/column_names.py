@@ -54,18 +54,7 @@ _WHOLE_NAMES |= dict.fromkeys(
 )
 _NO_UNIT = ("", "1", "none", "na", "sequence", "sample", "samples", "index", "number", "date", "time")
 _SHOWN_NAMES_MAX = 30
-_ROW_NUMBER_NAMES = (
-    "sample",
-    "samples",
-    "sample number",
-    "sample no",
-    "n",
-    "k",
-    "index",
-    "idx",
-    "seq",
-    "sequence",
-)
+_ROW_NAMES = ("sample", "samples", "sample number", "sample no", "n", "k", "index", "idx", "seq", "sequence")
 _AMBIGUOUS_NAMES = {"u", "v"}  # they could be two things: taken only where a unit in the name says which
 
 
@@ -202,7 +191,7 @@ def known_in(fields: Sequence[str]) -> int:
 
 def sample_number(header: Sequence[str]) -> str | None:
     """Return the column that numbers the samples, if one is called so."""
-    return next((name for name in header if " ".join(_parts("time", name)[0]) in _ROW_NUMBER_NAMES), None)
+    return next((name for name in header if " ".join(_parts("time", name)[0]) in _ROW_NAMES), None)
 
 
 def split_time(header: Sequence[str]) -> tuple[str, str] | None:
