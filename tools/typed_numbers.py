@@ -27,7 +27,7 @@ from dcmp_hil.session import Session
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from dcmp_hil.control.parameter_update import Change
+    from dcmp_hil.control.change import Change
 
 _RUN_DURATION_S = 5.0  # s, of a run
 _KINDS = (

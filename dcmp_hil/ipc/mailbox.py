@@ -14,7 +14,7 @@ from dcmp_hil.ipc.run_end import FORCED, RUN_CODES, RUN_END_WORD, UNCONFIRMED
 if TYPE_CHECKING:
     import mmap
 
-    from dcmp_hil.control.parameter_update import Change
+    from dcmp_hil.control.change import Change
 
 _HEADER_WORDS = 16  # of 8 bytes
 (

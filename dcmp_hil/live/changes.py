@@ -14,10 +14,10 @@ from dcmp_hil.values import ChangeData, Event, EventKind, PhaseData
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dcmp_hil.control.change import Change
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.observers.super_twisting import Tuning
-    from dcmp_hil.control.parameter_update import Change
     from dcmp_hil.control.trajectory import Trajectory
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.safety.chatter import Chatter

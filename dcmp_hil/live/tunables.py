@@ -12,9 +12,9 @@ from dcmp_hil.config.reference_reach import beyond_reach
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import observers
+from dcmp_hil.control.change import Change
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.control.parameter_update import Change
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError
 

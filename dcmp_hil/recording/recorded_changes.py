@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dcmp_hil.config import Rig
-    from dcmp_hil.control.parameter_update import Change
+    from dcmp_hil.control.change import Change
     from dcmp_hil.values import Event
 
 

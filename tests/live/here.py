@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.control.parameter_update import Change
+from dcmp_hil.control.change import Change
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.mailbox import Answer, Mailbox
 from dcmp_hil.ipc.run_end import LIVES
