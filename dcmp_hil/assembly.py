@@ -15,7 +15,7 @@ from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
-from dcmp_hil.live.changes import LiveChanges, NoChanges
+from dcmp_hil.live.live_changes import LiveChanges, NoChanges
 from dcmp_hil.loop import LoopStages
 from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.common.fast_tuple import make
-from dcmp_hil.live.changes import NoChanges
+from dcmp_hil.live.live_changes import NoChanges
 from dcmp_hil.values import Cycle, Timing
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.predictor import Predictor
     from dcmp_hil.control.trajectory import Trajectory
-    from dcmp_hil.live.changes import Changes
+    from dcmp_hil.live.live_changes import Changes
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
     from dcmp_hil.safety.outlier_filter import OutlierFilter

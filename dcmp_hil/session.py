@@ -14,7 +14,7 @@ from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
 from dcmp_hil.ipc.run_end import ZERO, end_after
-from dcmp_hil.live.changes import LiveChanges
+from dcmp_hil.live.live_changes import LiveChanges
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
 from dcmp_hil.platform.realtime import RealTime

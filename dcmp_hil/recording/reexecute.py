@@ -16,7 +16,7 @@ from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.mailbox import Mailbox
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.live.changes import LiveChanges
+from dcmp_hil.live.live_changes import LiveChanges
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.untrusted import UnreadTable, check_numbers, refuse_named

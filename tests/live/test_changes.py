@@ -70,7 +70,7 @@ def test_voltage_has_no_step_when_a_change_is_applied(overrides: Sequence[str]) 
 
 
 def test_a_change_at_once_would_be_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dcmp_hil.live.changes.GAIN_RAMP_TIME_S", 1e-9)
+    monkeypatch.setattr("dcmp_hil.live.live_changes.GAIN_RAMP_TIME_S", 1e-9)
     voltage = ChangedRun({_AT: ["controller.kind=pd"]}, *_IDEAL).run().columns["voltage_sent_V"]
     assert _largest_step(voltage, _AT, 300) > 1.0  # V
 
