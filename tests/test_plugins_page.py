@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.config.plugin_classes import check_named
+from dcmp_hil.config.plugin_check import check_named
 from dcmp_hil.plugins.roles import BACKEND, CONTROLLER, OBSERVER, Role
 
 PAGE = (Path(__file__).parents[1] / "docs" / "plugins.md").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ def check(rig: RigName, overrides: Overrides = None) -> None:
 
     from dcmp_hil.config import load_rig
     from dcmp_hil.config.explain import explain, warnings
-    from dcmp_hil.config.plugin_classes import check_named
+    from dcmp_hil.config.plugin_check import check_named
 
     loaded = load_rig(rig, overrides or ())
     check_named(loaded)

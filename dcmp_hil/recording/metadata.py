@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import __version__
 from dcmp_hil.common.printable_text import readable
-from dcmp_hil.config.plugin_classes import names_a_class
+from dcmp_hil.config.plugin_check import names_a_class
 from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.platform.host_info import host_facts
 from dcmp_hil.recording.schema import FORMAT
