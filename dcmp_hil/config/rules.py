@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.formatting import number
-from dcmp_hil.config.loop_rules import gains_hold
+from dcmp_hil.config.gain_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.control.observers.super_twisting import bandwidth_floor
 from dcmp_hil.safety.speed_resolution import lowest_limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.loop_rules import loops
+from dcmp_hil.config.gain_rules import loops
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.config import change_rig
 from dcmp_hil.config.explain import by_rule, warnings
 from dcmp_hil.config.formatting import toml_value
-from dcmp_hil.config.loop_rules import holds
+from dcmp_hil.config.gain_rules import holds
 from dcmp_hil.config.reference_reach import beyond_reach
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation

@@ -171,7 +171,7 @@ def test_the_rule_is_right_such_gains_do_end_a_run_where_it_is_got_round(
     monkeypatch: pytest.MonkeyPatch, override: str
 ) -> None:
     """As if the rule had let it pass: the run ends orderly all the same, or never exceeds what is allowed."""
-    monkeypatch.setattr("dcmp_hil.config.loop_rules._fault", lambda _: None)
+    monkeypatch.setattr("dcmp_hil.config.gain_rules._fault", lambda _: None)
     monkeypatch.setattr("dcmp_hil.live.tunables.expected_variation", lambda _: 70.0)
     live = ChangedRun({2000: [override]}, duration=6.0)
     with pytest.raises(TripError) as caught:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dcmp_hil import load_rig, run
-from dcmp_hil.config.loop_rules import loops
+from dcmp_hil.config.gain_rules import loops
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.session import Session
