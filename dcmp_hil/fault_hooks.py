@@ -62,7 +62,7 @@ def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Faults:
     rig
         What will be run.
     faults
-        Texts, such as ``wire.drop:p=0.2,at=3s,for=1s``, or objects of `sim_backend.faults.fault.FaultSpec`.
+        Texts, such as ``wire.drop:p=0.2,at=3s,for=1s``, or objects of `sim_backend.faults.fault_spec.FaultSpec`.
     key
         What the user wrote them behind, for the messages.
 

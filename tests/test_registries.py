@@ -23,7 +23,7 @@ from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
 from dcmp_hil.telemetry.run_plot import draw_run
 from dcmp_hil.telemetry.signals import SIGNALS, by_plot
-from sim_backend.faults.fault import KINDS as FAULTS
+from sim_backend.faults.fault_spec import KINDS as FAULTS
 from sim_backend.plant import make_plant
 from tests.contract.benches import ALL, on_bench
 from tests.faults.rows import ROWS

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Estimate, Sample, Truth
     from sim_backend.encoder import Encoder
     from sim_backend.faults.base import FaultModel, RigFacts
-    from sim_backend.faults.fault import FaultSpec
+    from sim_backend.faults.fault_spec import FaultSpec
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer
     from sim_backend.plant import Plant

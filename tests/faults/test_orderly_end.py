@@ -10,7 +10,7 @@ from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.session import Session
 from dcmp_hil.wire.messages import State
 from sim_backend.board.board import Board
-from sim_backend.faults.fault import FaultSpec
+from sim_backend.faults.fault_spec import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 

@@ -16,7 +16,7 @@ from dcmp_hil.ipc.mailbox import APPLIED
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.session import Session
 from sim_backend.faults.base import Number
-from sim_backend.faults.fault import KINDS, FaultSpec
+from sim_backend.faults.fault_spec import KINDS, FaultSpec
 from sim_backend.faults.host import InjectedError
 from sim_backend.faults.parser import WrongFaultError
 from sim_backend.faults.plan import FaultPlan, inject

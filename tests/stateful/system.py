@@ -16,7 +16,7 @@ from dcmp_hil.wire import cobs
 from dcmp_hil.wire.codec import pack
 from dcmp_hil.wire.messages import State, Stop
 from sim_backend.board.board import Board
-from sim_backend.faults.fault import FaultSpec
+from sim_backend.faults.fault_spec import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from sim_backend.pacer import Pacer
 from tests.helpers import bench
