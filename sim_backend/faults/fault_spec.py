@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from sim_backend.faults.base import FaultContext, Number, RigFacts
+from sim_backend.faults.fault_model import FaultContext, Number, RigFacts
 from sim_backend.faults.firmware import FIRMWARE
 from sim_backend.faults.host import HOST
 from sim_backend.faults.parser import WrongFaultError, check, parse
@@ -16,7 +16,7 @@ from sim_backend.faults.wire import WIRE
 if TYPE_CHECKING:
     import random
 
-    from sim_backend.faults.base import FaultModel, Value
+    from sim_backend.faults.fault_model import FaultModel, Value
 
 KINDS = {**WIRE, **FIRMWARE, **PLANT, **HOST}
 """Every kind by name; the part before the dot is its level."""

@@ -8,7 +8,7 @@ from dcmp_hil.wire.carriers import DECODERS, ENCODERS
 from dcmp_hil.wire.codec import CorruptFrameError, pack, unpack
 from dcmp_hil.wire.messages import Drive, Hello, Identity, Stop
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from sim_backend.faults.base import FaultModel, Kind, Number
+from sim_backend.faults.fault_model import FaultModel, Kind, Number
 from sim_backend.faults.wire import WireFault
 
 if TYPE_CHECKING:

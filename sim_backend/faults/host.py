@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from sim_backend.faults.base import Choice, FaultModel, Kind, Number
+from sim_backend.faults.fault_model import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.values import UNKNOWN_TRUTH
 from sim_backend.board.board import Board
-from sim_backend.faults.base import FaultContext
+from sim_backend.faults.fault_model import FaultContext
 from sim_backend.faults.faulty_link import FaultyLink
 from sim_backend.faults.firmware import Start, WrongClock
 from sim_backend.faults.host import HostFault
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.values import Estimate, Sample, Truth
     from sim_backend.encoder import Encoder
-    from sim_backend.faults.base import FaultModel, RigFacts
+    from sim_backend.faults.fault_model import FaultModel, RigFacts
     from sim_backend.faults.fault_spec import FaultSpec
     from sim_backend.faults.wire import Way
     from sim_backend.pacer import Pacer

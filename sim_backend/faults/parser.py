@@ -7,12 +7,12 @@ import re
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from sim_backend.faults.base import Number
+from sim_backend.faults.fault_model import Number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from sim_backend.faults.base import Choice, Kind, Value
+    from sim_backend.faults.fault_model import Choice, Kind, Value
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
 _SECONDS_PER_UNIT = {"s": 1.0, "ms": 1e-3, "": 1.0}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.backends import Device, SimBoard
 from dcmp_hil.errors import ConfigError
-from sim_backend.faults.base import RigFacts
+from sim_backend.faults.fault_model import RigFacts
 from sim_backend.faults.fault_spec import KINDS, FaultSpec
 from sim_backend.faults.injector import Injector
 from sim_backend.faults.parser import WrongFaultError

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import UNKNOWN_TRUTH
 from sim_backend.encoder import Encoder
-from sim_backend.faults.base import Choice, FaultModel, Kind, Number
+from sim_backend.faults.fault_model import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Truth

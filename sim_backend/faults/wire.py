@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from sim_backend.faults.base import Choice, FaultModel, Kind, Number
+from sim_backend.faults.fault_model import Choice, FaultModel, Kind, Number
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
     from sim_backend.board.board import Board
-    from sim_backend.faults.base import RigFacts, Value
+    from sim_backend.faults.fault_model import RigFacts, Value
 
 Way = Literal["up", "down"]
 """`up`: from host to device."""

@@ -11,7 +11,7 @@ from dcmp_hil import errors
 from dcmp_hil.session import Session
 from dcmp_hil.values import Fault as Code
 from sim_backend.board.board import Board
-from sim_backend.faults.base import Choice
+from sim_backend.faults.fault_model import Choice
 from sim_backend.faults.fault_spec import KINDS, FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.matrix import outcome_of, same_session

@@ -15,7 +15,7 @@ from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.ipc.mailbox import APPLIED
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.session import Session
-from sim_backend.faults.base import Number
+from sim_backend.faults.fault_model import Number
 from sim_backend.faults.fault_spec import KINDS, FaultSpec
 from sim_backend.faults.host import InjectedError
 from sim_backend.faults.parser import WrongFaultError
@@ -27,7 +27,7 @@ from tests.live.here import Here
 
 if TYPE_CHECKING:
     from dcmp_hil.result import Result
-    from sim_backend.faults.base import FaultContext
+    from sim_backend.faults.fault_model import FaultContext
 
 BOARD = "backend.kind=sim-board"
 QUICK = "supervisor.start=immediate"

@@ -26,7 +26,7 @@ from tests.stateful.judge import Judge
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.wire.messages import Message
-    from sim_backend.faults.base import FaultModel
+    from sim_backend.faults.fault_model import FaultModel
     from sim_backend.faults.faulty_link import FaultyLink
 
 FAULTS = {
