@@ -28,7 +28,7 @@ from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
 from dcmp_hil.telemetry.dispatcher import SinkDispatcher
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
-from dcmp_hil.telemetry.worker import DONE, FIGURES, UP, WorkerSetup, WorkerState
+from dcmp_hil.telemetry.telemetry_worker import DONE, FIGURES, UP, WorkerSetup, WorkerState
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ Rerun's allocator gives free pages back at once and not after a second: it holds
 _CODE = """
 import sys
 sys.path[:] = {path!r}
-from dcmp_hil.telemetry.worker import main
+from dcmp_hil.telemetry.telemetry_worker import main
 main({connection}, {setup}, {terminal})
 """
 

@@ -89,7 +89,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 def test_telemetry_process_does_not_import_what_the_run_does() -> None:
     code = (
-        "import pickle, sys, dcmp_hil.telemetry.worker\n"
+        "import pickle, sys, dcmp_hil.telemetry.telemetry_worker\n"
         "pickle.loads(bytes.fromhex(sys.argv[1]))\n"
         "print([m for m in ('rerun', 'pydantic', 'scipy', 'matplotlib', 'can') if m in sys.modules])"
     )

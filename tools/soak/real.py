@@ -10,12 +10,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from dcmp_hil.live import command_server
-from dcmp_hil.telemetry import worker
+from dcmp_hil.telemetry import telemetry_worker
 from tools.soak.memory import Memory, cpu_s
 from tools.soak.result import Soaked, periods_in, size_mb
 
 _POLL_PERIOD_S = 5.0
-_PROGRAMS = {worker.__name__: "telemetry process", command_server.__name__: "command process"}
+_PROGRAMS = {telemetry_worker.__name__: "telemetry process", command_server.__name__: "command process"}
 """Module that a child of a run imports, to what it is called."""
 
 
