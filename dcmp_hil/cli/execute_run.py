@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.foreign_lines import split_stderr
+from dcmp_hil.cli.library_output import split_stderr
 from dcmp_hil.cli.orphaned_run import Unattended
 from dcmp_hil.cli.outputs import json_place, try_places
 from dcmp_hil.cli.recording_check import kept_in, space_warning
