@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from dcmp_hil.config.formatting import printable, toml_value
 from dcmp_hil.config.overrides import apply_overrides
 from dcmp_hil.config.rig import Rig
-from dcmp_hil.config.toml_errors import name_from, parse
+from dcmp_hil.config.toml_text import name_from, parse
 from dcmp_hil.config.validation_errors import explain_faults
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import ConfigError

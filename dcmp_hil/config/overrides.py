@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.config.formatting import dotted, printable
 from dcmp_hil.config.rig import KINDS
-from dcmp_hil.config.toml_errors import parse_value
+from dcmp_hil.config.toml_text import parse_value
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:

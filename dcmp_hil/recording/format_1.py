@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.common.printable_text import readable
-from dcmp_hil.config.toml_errors import parse_value
+from dcmp_hil.config.toml_text import parse_value
 from dcmp_hil.values import ChangeData, Event, EventKind, LinkData, PhaseData
 
 if TYPE_CHECKING:
