@@ -15,7 +15,7 @@ from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
 from dcmp_hil.cli.forced_exit import leave
-from dcmp_hil.cli.live import set_keys, status, stop, tell_stopped
+from dcmp_hil.cli.live_commands import set_keys, status, stop, tell_stopped
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.panel import panel
 from dcmp_hil.cli.paper import paper

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 import typer
 
 from dcmp_hil.cli import console
-from dcmp_hil.cli.live import Run
+from dcmp_hil.cli.live_commands import Run
 
 
 def panel(
