@@ -46,8 +46,8 @@ def run(
     faults
         What goes wrong on purpose on a simulated rig: texts as behind `dcmp-hil run --fault`, such as
         ``["wire.drop:p=0.2,at=3s,for=1s", "plant.shove:at=2s"]``, or objects
-        ``FaultSpec("plant.shove", at=2.0, rad_s2=300)`` of `sim_backend.faults.fault_spec`, whose `at` may be a
-        function of time and true state. Everything random in them follows from `sim.seed`. Faults of the
+        ``FaultSpec("plant.shove", at=2.0, rad_s2=300)`` of `sim_backend.faults.fault_spec`, whose `at` may
+        be a function of time and true state. Everything random in them follows from `sim.seed`. Faults of the
         wire and of the firmware need `backend.kind = "sim-board"`.
     clear
         Whether a fault of an earlier run that waits for a person is cleared; see `Session`.

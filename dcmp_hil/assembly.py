@@ -17,8 +17,8 @@ from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.live.live_changes import LiveChanges, NoChanges
 from dcmp_hil.loop import LoopStages
-from dcmp_hil.plugins import make_named
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
+from dcmp_hil.plugins.named_class import make_named
 from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor

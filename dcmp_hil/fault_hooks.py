@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins.named_class import find_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -62,7 +62,8 @@ def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Faults:
     rig
         What will be run.
     faults
-        Texts, such as ``wire.drop:p=0.2,at=3s,for=1s``, or objects of `sim_backend.faults.fault_spec.FaultSpec`.
+        Texts, such as ``wire.drop:p=0.2,at=3s,for=1s``, or objects of the class
+        `sim_backend.faults.fault_spec.FaultSpec`.
     key
         What the user wrote them behind, for the messages.
 

@@ -16,7 +16,7 @@ from dcmp_hil.config.sections import SimSection
 from dcmp_hil.device.links import registry
 from dcmp_hil.device.links.listen_only import make_listening_link
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins.named_class import find_named
 from dcmp_hil.telemetry import signals
 from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.plot_labels import title

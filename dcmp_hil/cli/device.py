@@ -53,7 +53,7 @@ def device(
     from dcmp_hil.config import load_rig
     from dcmp_hil.platform.clock import MonotonicClock
     from dcmp_hil.platform.stop_request import StopRequest
-    from dcmp_hil.plugins import find_named
+    from dcmp_hil.plugins.named_class import find_named
 
     loaded = load_rig(rig, overrides or ())
     make = find_named(_DEVICE_CLASS, "device")

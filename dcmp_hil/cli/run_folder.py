@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shutil
 import sys
 from contextlib import suppress
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.black_box import black_box
 from dcmp_hil.common.atomic_file import write_text
 from dcmp_hil.errors import ConfigError, TripError
 from dcmp_hil.platform.clock import utc_now
@@ -79,7 +78,7 @@ class RunFolder:
         figures = {**document, "rig_toml": rig.model_dump(mode="json")}
         missing = [self._kept("summary.json", lambda path: write_text(path, console.as_json(figures)))]
         if isinstance(error, TripError):
-            missing.append(self._kept("black_box.csv", lambda path: write_text(path, _black_box(error))))
+            missing.append(self._kept("black_box.csv", lambda path: write_text(path, black_box(error))))
         return [sentence for sentence in missing if sentence]
 
     def _kept(self, name: str, write: Callable[[Path], None]) -> str:
@@ -125,23 +124,6 @@ class RunFolder:
                 raise
             # Matplotlib is an extra, the disk may be full, and settings of Matplotlib may be wrong.
             console.note(f"no picture: {str(error) or type(error).__name__}")
-
-
-def _black_box(trip: TripError) -> str:
-    """Return one row a cycle of the last second, flat."""
-    file = io.StringIO(newline="")
-    writer = csv.writer(file)
-    writer.writerow(
-        [
-            *("t_s", "position_rad", "voltage_applied_V", "fault"),
-            *("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2"),
-            *("position_reference_rad", "velocity_reference_rad_s", "acceleration_reference_rad_s2"),
-            *("voltage_demand_V", "voltage_sent_V", "period_s", "lateness_s", "compute_s"),
-        ]
-    )
-    for c in trip.cycles:
-        writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing])
-    return file.getvalue()
 
 
 def _viewer_command() -> str:

@@ -8,8 +8,8 @@ from dcmp_hil.device.links.registry import BACKENDS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.platform.clock import SimulatedClock
-from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked_backend import CheckedBackend
+from dcmp_hil.plugins.named_class import find_named, make
 from dcmp_hil.plugins.roles import BACKEND
 
 if TYPE_CHECKING:

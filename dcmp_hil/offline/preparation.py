@@ -14,8 +14,8 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.resolution import equivalent_counts_per_rev, estimate_counts_per_rev
 from dcmp_hil.offline.settings import IDEAL, ReplaySettings
-from dcmp_hil.plugins import find_named, make
 from dcmp_hil.plugins.checked import CheckedObserver
+from dcmp_hil.plugins.named_class import find_named, make
 from dcmp_hil.plugins.roles import OBSERVER
 
 if TYPE_CHECKING:

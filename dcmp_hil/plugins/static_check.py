@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.plugins import needs, no_such_class, not_found, split_named
 from dcmp_hil.plugins.error_text import shown_path, syntax_of
 from dcmp_hil.plugins.module_search import locate
+from dcmp_hil.plugins.named_class import needs, no_such_class, not_found, split_named
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.plugins import find_named, make_named
+from dcmp_hil.plugins.named_class import find_named, make_named
 from dcmp_hil.plugins.roles import BACKEND, CONTROLLER, OBSERVER, Role
 from dcmp_hil.plugins.static_check import look_at
 from tests.plugins.observer_text import OBSERVER_TEXT

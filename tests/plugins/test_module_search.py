@@ -12,7 +12,7 @@ from dcmp_hil.assembly import make_observer
 from dcmp_hil.control.references.periodic import Sine
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins.named_class import find_named
 from dcmp_hil.plugins.roles import OBSERVER
 from dcmp_hil.plugins.static_check import look_at
 from dcmp_hil.values import Sample

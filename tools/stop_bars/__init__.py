@@ -1,1 +1,1 @@
-"""Traces of the firmware's core, step by step: what goes in, and what the device then is."""
+"""STOP against controllers that are bad to their run, timed at the device."""

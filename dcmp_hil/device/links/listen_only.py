@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.device.links.registry import LISTENERS
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.plugins import find_named
+from dcmp_hil.plugins.named_class import find_named
 
 if TYPE_CHECKING:
     from dcmp_hil.common.section import Section
