@@ -14,7 +14,7 @@ from tests.installed import environment
 if TYPE_CHECKING:
     from pathlib import Path
 
-_BOUND_S = 240.0  # these machines are shared
+_TIMEOUT_S = 240.0  # these machines are shared
 
 
 def in_own_namespace(kind: str) -> list[str]:
@@ -45,5 +45,5 @@ def on_disk_of(size: str, folder: Path, *command: str) -> subprocess.CompletedPr
     kept = 'mount -t tmpfs -o size="$0" none runs && "$@"; code=$?; cp -r runs kept; exit $code'
     return subprocess.run(
         [*in_own_namespace("mount"), "sh", "-c", kept, size, *command],
-        cwd=folder, env=environment(), check=False, capture_output=True, text=True, timeout=_BOUND_S,
+        cwd=folder, env=environment(), check=False, capture_output=True, text=True, timeout=_TIMEOUT_S,
     )  # fmt: skip

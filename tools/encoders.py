@@ -12,7 +12,7 @@ from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.session import Session
 from tests import helpers
-from tests.figures.detection import ENGAGED, detect
+from tests.figures.detection import ENGAGED_AT_S, detect
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,7 +83,7 @@ def reactions(counts: float, rate: float, *, seeds: int) -> Iterator[str]:
         if backend is helpers.Reversed:
             times = [each.tripped_at - each.fault_at for each in found]
         elif backend is helpers.ReversedFromTheStart:
-            times = [each.tripped_at - ENGAGED for each in found]
+            times = [each.tripped_at - ENGAGED_AT_S for each in found]
         speed = max(each.speed for each in found)
         typical, longest = 1e3 * median(times), 1e3 * max(times)
         yield f"| {counts} | {rate} | {name} | {typical:.0f} | {longest:.0f} | {speed:.1f} |"

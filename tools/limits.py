@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from tests.attacks.hostile.wrong_observers import KINDS
-from tests.attacks.limit_runs import BY, LIMITS, NEEDED, attack, healthy, most_speed, rig_under
+from tests.attacks.limit_runs import BY, LIMITS_RAD_S, NEEDED, attack, healthy, most_speed, rig_under
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -36,7 +36,7 @@ def _attacked(job: tuple[Cell, int]) -> tuple[Cell, Outcome]:
 
 def attacks(seeds: int, jobs: int) -> dict[Cell, list[Outcome]]:
     """Run every cell with so many seeds."""
-    cells = [Cell(*one) for one in product(BY, LIMITS, KINDS)]
+    cells = [Cell(*one) for one in product(BY, LIMITS_RAD_S, KINDS)]
     found: dict[Cell, list[Outcome]] = defaultdict(list)
     with ProcessPoolExecutor(jobs) as pool:
         for cell, outcome in pool.map(_attacked, product(cells, range(seeds)), chunksize=20):
@@ -53,7 +53,7 @@ def table(found: dict[Cell, list[Outcome]]) -> Iterable[str]:
     """Lay out the fastest true speed at 0 V by limit and observer, and the most that gravity added."""
     yield f"| kept by | limit | allowed (least noise) | {' | '.join(KINDS)} | half a second after 0 V |"
     yield f"|---|---|---|{'---|' * len(KINDS)}---|"
-    for by, limit in product(BY, LIMITS):
+    for by, limit in product(BY, LIMITS_RAD_S):
         row = [found[Cell(by, limit, kind)] for kind in KINDS]
         speeds = " | ".join(f"{max(outcome.speed for outcome in cell):.2f}" for cell in row)
         later = max(outcome.afterwards for cell in row for outcome in cell)

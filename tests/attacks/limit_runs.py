@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample, Truth
     from sim_backend.board.board import Board
 
-LIMITS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+LIMITS_RAD_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 """rad/s."""
 BY = {
     "host": ("backend.kind=sim",),
@@ -30,8 +30,8 @@ leaves it to the firmware."""
 NEEDED = {("host", 2.0): 2.6, ("device", 2.0): 3.0}
 """rad/s that the arm may have at 0 V, at 4096 counts and 1 kHz."""
 _MODULE = "tests.attacks.hostile.wrong_observers"
-_LENGTH, _AFTERWARDS = 2.0, 0.5  # s, of an attack and of what is looked at behind its end
-_HEALTHY = 2.5  # s
+_DURATION_S, _DURATION_AFTER_S = 2.0, 0.5  # s, of an attack and of what is looked at behind its end
+_HEALTHY_DURATION_S = 2.5  # s
 _NOISE_SIGMAS = 4.5  # 3.2 times sqrt(2), for a difference of two: a quantile, for Gaussian noise has no bound
 
 
@@ -81,10 +81,10 @@ def attacked(rig: Rig) -> Outcome:
     witness, reason = Witness(line.backend), "completed"
     with line.backend:
         try:
-            loop.run(replace(line, backend=witness), _LENGTH, NoStop())  # type: ignore[arg-type]
+            loop.run(replace(line, backend=witness), _DURATION_S, NoStop())  # type: ignore[arg-type]
         except DcmpError as error:
             reason = getattr(error, "reason", type(error).__name__)
-        for _ in range(round(_AFTERWARDS / rig.period)):
+        for _ in range(round(_DURATION_AFTER_S / rig.period)):
             witness.write(0.0)
             witness.read()
     last = max((i for i, (voltage, _) in enumerate(witness.seen) if voltage != 0.0), default=0)
@@ -180,7 +180,7 @@ def healthy(seed: int) -> Healthy:
     witness, reason = Witness(line.backend), "completed"
     with line.backend:
         try:
-            loop.run(replace(line, backend=witness), _HEALTHY, NoStop())  # type: ignore[arg-type]
+            loop.run(replace(line, backend=witness), _HEALTHY_DURATION_S, NoStop())  # type: ignore[arg-type]
         except DcmpError as error:
             reason = str(error)
     return Healthy(reason, max(abs(truth.velocity) for _, truth in witness.seen), limit)

@@ -22,7 +22,7 @@ import pytest
 
 from dcmp_hil.live import run_sockets
 from dcmp_hil.recording.reader import read_run
-from tests.live.processes import BOUND, command_process_of, started, until, until_running
+from tests.live.processes import TIMEOUT_S, command_process_of, started, until, until_running
 from tools.stop_bars.attack import attack
 from tools.stop_bars.bars import HOSTILE, KINDS, WAYS, Bar, table
 
@@ -138,10 +138,10 @@ def test_stop_works_when_the_command_process_is_killed(tmp_path: Path) -> None:
             [sys.executable, "-m", "dcmp_hil", "stop", "--run", str(run.pid)],
             capture_output=True,
             text=True,
-            timeout=BOUND,
+            timeout=TIMEOUT_S,
             check=False,
         )
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
     assert (done.returncode, done.stderr) == (0, "")
     assert "confirmed after" in done.stdout
     assert json.loads((tmp_path / "figures.json").read_text())["ended_by"] == "STOP"

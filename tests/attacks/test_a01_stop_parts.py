@@ -28,7 +28,7 @@ from dcmp_hil.telemetry.parent_exit import how_it_died
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 from tests.live.here import ChangedRun
-from tests.live.processes import BOUND, until
+from tests.live.processes import TIMEOUT_S, until
 
 if TYPE_CHECKING:
     from dcmp_hil.values import Sample
@@ -177,13 +177,13 @@ def test_fork_has_neither_handlers_nor_lines_of_the_run(tmp_path: Path) -> None:
         if pid == 0:  # pragma: no cover - another process
             handler = signal.getsignal(signal.SIGTERM)
             (tmp_path / "handler").write_text(str(handler == mine))
-            time.sleep(BOUND)
+            time.sleep(TIMEOUT_S)
             os._exit(0)
         until(lambda: (tmp_path / "handler").exists() and (tmp_path / "handler").read_text(), "it forked")
         stop.wake_no_more()
         forget(ours.fileno())
         ours.close()
-        theirs.settimeout(BOUND)
+        theirs.settimeout(TIMEOUT_S)
         assert theirs.recv(1) == b""  # the fork does not hold it
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
@@ -197,7 +197,7 @@ def test_fork_does_not_keep_the_lock_of_a_port(tmp_path: Path) -> None:
     pid = os.fork()
     if pid == 0:  # pragma: no cover - another process
         (tmp_path / "forked").touch()
-        time.sleep(BOUND)
+        time.sleep(TIMEOUT_S)
         os._exit(0)
     try:
         until((tmp_path / "forked").exists, "it forked")
@@ -225,6 +225,11 @@ def test_ctrl_c_while_python_imports_is_quiet(tmp_path: Path, at: str) -> None:
         "main()\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=BOUND, check=False
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+        check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

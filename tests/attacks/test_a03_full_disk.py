@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     Script = Callable[..., Finished]
 
-_BOUND = 240.0  # s: these machines are shared
-_SEEDS = 40
+_TIMEOUT_S = 240.0  # s: these machines are shared
+_SEED_COUNT = 40
 _PERIODS = 1500
 _FILLER = """
 import glob, os, random, sys, time
@@ -109,7 +109,7 @@ def _recorded(path: Path, disk: _Disk, room: int) -> tuple[RecordingSink, np.nda
     return sink, np.concatenate([block.rows for block in made])
 
 
-@pytest.mark.parametrize("seed", range(_SEEDS))
+@pytest.mark.parametrize("seed", range(_SEED_COUNT))
 def test_moments_of_a_full_disk_cost_nothing(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "run.mcap"
     sink, rows = _recorded(path, _Disk(seed, full=0.7), room=8 << 20)
@@ -121,7 +121,7 @@ def test_moments_of_a_full_disk_cost_nothing(tmp_path: Path, seed: int) -> None:
     assert not any("misses" in sentence for sentence in sink.warnings)
 
 
-@pytest.mark.parametrize("seed", range(_SEEDS))
+@pytest.mark.parametrize("seed", range(_SEED_COUNT))
 def test_what_a_full_disk_costs_is_told_with_its_time(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "run.mcap"
     sink, rows = _recorded(path, _Disk(seed, full=0.97), room=20_000)
@@ -159,7 +159,7 @@ def _on_a_disk(
 
 def test_a_disk_that_fills_and_empties_costs_a_run_nothing(installed: Path, tmp_path: Path) -> None:
     run = ("run", "--duration", "7", "--viewer", "none", "--no-control", "--json", "out.json")
-    done = _on_a_disk("6m", tmp_path, (str(_SEEDS), "3", "goes"), str(installed), *run)
+    done = _on_a_disk("6m", tmp_path, (str(_SEED_COUNT), "3", "goes"), str(installed), *run)
     assert "Traceback" not in done.stderr
     (folder,) = (file for file in (tmp_path / "kept").iterdir() if file.is_dir())
     document = json.loads((tmp_path / "out.json").read_text())

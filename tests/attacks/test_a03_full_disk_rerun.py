@@ -26,7 +26,7 @@ from tests.namespaces import on_disk_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_BOUND = 120.0  # s: these machines are shared
+_TIMEOUT_S = 120.0  # s: these machines are shared
 _STUCK_IN_C = """
 import ctypes, sys
 from dcmp_hil.telemetry.rerun import sink as rerun_sink
@@ -90,7 +90,7 @@ def test_a_call_into_rerun_that_never_returns_leaves_sigterm_heard(
     assert stuck.stdout.readline() == "stuck\n"
     stuck.send_signal(signal.SIGTERM)
     began = time.monotonic()
-    _, said = stuck.communicate(timeout=_BOUND)
+    _, said = stuck.communicate(timeout=_TIMEOUT_S)
     assert time.monotonic() - began < 60.0
     assert stuck.returncode not in {None, 0, -signal.SIGKILL}
     assert "Traceback" not in said
@@ -105,7 +105,7 @@ def test_pages_end_with_the_process_that_serves_them() -> None:
         pid, serves = parent.stdout.readline().split()
         assert serves == "True"
         parent.kill()
-        parent.wait(_BOUND)
+        parent.wait(_TIMEOUT_S)
     until(
         lambda: not _runs(int(pid)), "its program ended"
     )  # the kernel sends the signal with the end of the parent

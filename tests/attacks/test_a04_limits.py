@@ -28,7 +28,7 @@ from sim_backend.board.backend import SimBoardBackend
 from tests.attacks.hostile import wrong_observers
 from tests.attacks.limit_runs import (
     BY,
-    LIMITS,
+    LIMITS_RAD_S,
     NEEDED,
     Outcome,
     attack,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from sim_backend.board.board import Board
 
 ENDS = {"speed", "device_fault", "travel", "disturbance", "jump", "polarity", "stuck", "power"}
-RUNS = 3
+RUN_COUNT = 3
 HEALTHY_RUNS = 5
 
 
@@ -58,14 +58,14 @@ def _found(outcomes: list[Outcome], most: float) -> list[Outcome]:
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize("first", range(0, 12, RUNS))
+@pytest.mark.parametrize("first", range(0, 12, RUN_COUNT))
 @pytest.mark.parametrize("kind", wrong_observers.KINDS)
-@pytest.mark.parametrize("limit", LIMITS)
+@pytest.mark.parametrize("limit", LIMITS_RAD_S)
 @pytest.mark.parametrize("by", BY)
 def test_no_wrong_observer_leads_an_arm_beyond_its_limit(
     by: str, limit: float, kind: str, first: int
 ) -> None:
-    outcomes = {seed: attack(limit, kind, seed, by) for seed in range(first, first + RUNS)}
+    outcomes = {seed: attack(limit, kind, seed, by) for seed in range(first, first + RUN_COUNT)}
     assert [one for seed, one in outcomes.items() if not one.speed <= _most(by, limit, seed)] == []
 
 

@@ -24,7 +24,7 @@ import pytest
 
 from dcmp_hil.live.client import status, stop
 from dcmp_hil.live.run_sockets import socket_of
-from tests.live.processes import BOUND, own_folder, started, until, until_running
+from tests.live.processes import TIMEOUT_S, own_folder, started, until, until_running
 from tests.memory import peak_mb
 from tests.panel.browser import browser, needed
 from tests.panel.test_browser import address_of, free_port
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 _FLOOD = Path(__file__).with_name("hostile") / "flood.py"
 _RUN = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0")
-_REQUESTS = 3_000
+_REQUEST_COUNT = 3_000
 _SEED = 12
 _MEMORY_MB = 200.0
-_LOG = 4_000  # characters
+_LOG_CHARS_MAX = 4_000  # characters
 
 
 class _Panel(NamedTuple):
@@ -73,7 +73,7 @@ def panel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[_Panel]:
             reader.start()
             yield _Panel(process, port, token, log)
             process.kill()
-            reader.join(BOUND)
+            reader.join(TIMEOUT_S)
 
 
 @contextmanager
@@ -86,7 +86,7 @@ def _flooded(kind: str, target: str, times: int = 1) -> Iterator[None]:
     finally:
         for flood in floods:
             flood.kill()
-            flood.wait(BOUND)
+            flood.wait(TIMEOUT_S)
 
 
 @pytest.mark.parametrize("kind", ["half_open", "requests"])
@@ -96,27 +96,28 @@ def test_stop_gets_through_a_flood(
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         until(
-            lambda: panel.stop(BOUND, pressed_ms=-1e9)[1]["said"] != "There is no run.", "the panel found it"
+            lambda: panel.stop(TIMEOUT_S, pressed_ms=-1e9)[1]["said"] != "There is no run.",
+            "the panel found it",
         )
         with _flooded(kind, str(panel.port), 2):
             waits = []
             for _ in range(10):  # too old to be acted on, but answered
                 began = time.monotonic()
-                assert "was dropped" in str(panel.stop(BOUND, pressed_ms=-1e9)[1]["said"])
+                assert "was dropped" in str(panel.stop(TIMEOUT_S, pressed_ms=-1e9)[1]["said"])
                 waits.append(time.monotonic() - began)
             assert status(run.pid)["phase"] == "running"
             began = time.monotonic()
-            code, said = panel.stop(BOUND)
+            code, said = panel.stop(TIMEOUT_S)
             waits.append(time.monotonic() - began)
             assert (code, said["ok"]) == (200, True), said
-            run.communicate(timeout=BOUND)
+            run.communicate(timeout=TIMEOUT_S)
     median_ms, worst_ms = 1e3 * sorted(waits)[5], 1e3 * max(waits)
     figure(f"A9: STOP through {kind}: {median_ms:.0f} ms median, {worst_ms:.0f} ms worst of 11")
     assert median_ms < 1e3  # the worst is a matter of the machine's other load
     assert panel.peak_mb() < _MEMORY_MB
     panel.process.kill()
-    panel.process.wait(BOUND)
-    assert len("".join(panel.log)) < _LOG
+    panel.process.wait(TIMEOUT_S)
+    assert len("".join(panel.log)) < _LOG_CHARS_MAX
     assert "Traceback" not in "".join(panel.log)
 
 
@@ -130,7 +131,7 @@ def test_stop_gets_through_a_flood_of_the_control_socket(
             began = time.monotonic()
             stop(run.pid)
             waited = time.monotonic() - began
-            assert run.wait(BOUND) == 0
+            assert run.wait(TIMEOUT_S) == 0
     figure(f"A9: STOP through {kind} at the control socket: {1e3 * waited:.0f} ms")
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert figures["ended_by"] == "STOP"
@@ -155,14 +156,14 @@ def test_a_stop_that_waited_is_dropped_and_the_page_says_so(panel: _Panel, tmp_p
         until(lambda: "and was dropped. Press it again" in shown("banner"), "the page said what became of it")
         assert status(run.pid)["phase"] == "running"
         page.find_element("id", "stop").click()
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
         until(lambda: shown("phase") == "run ended", "the page said that the run ended")
         until(lambda: "not confirmed" not in shown("banner"), "the page doubts no more")
 
 
 def test_every_odd_request_is_refused_without_a_traceback(panel: _Panel) -> None:
     rng = random.Random(_SEED)
-    for _ in range(_REQUESTS):
+    for _ in range(_REQUEST_COUNT):
         request = _odd(rng, panel)
         answer = _sent(panel.port, request)
         if answer:
@@ -171,9 +172,9 @@ def test_every_odd_request_is_refused_without_a_traceback(panel: _Panel) -> None
     assert panel.process.poll() is None
     assert panel.peak_mb() < _MEMORY_MB
     panel.process.kill()
-    panel.process.wait(BOUND)
+    panel.process.wait(TIMEOUT_S)
     assert "Traceback" not in "".join(panel.log)
-    assert len("".join(panel.log)) < _LOG
+    assert len("".join(panel.log)) < _LOG_CHARS_MAX
 
 
 def test_what_was_found_odd_before_is_a_4xx(panel: _Panel) -> None:
@@ -259,7 +260,7 @@ def _sent(port: int, request: bytes) -> bytes:
     answer = b""
     with (
         suppress(ConnectionError),
-        socket.create_connection(("127.0.0.1", port), timeout=BOUND) as connection,
+        socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT_S) as connection,
     ):
         connection.sendall(request)
         with suppress(OSError):

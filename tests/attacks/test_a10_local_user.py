@@ -25,7 +25,7 @@ from dcmp_hil.platform import other_users
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.viewer import answers
-from tests.live.processes import BOUND, started, until, until_running
+from tests.live.processes import TIMEOUT_S, started, until, until_running
 from tests.panel.test_browser import free_port
 from tests.telemetry.runs import VIEW, blocks, read_back, values
 
@@ -85,13 +85,13 @@ def test_what_is_pushed_into_the_server_reaches_no_file_of_the_run(tmp_path: Pat
         recording_id = _recording_id(next(tmp_path.glob("runs/*/run.rrd")))
         push = subprocess.run(
             [sys.executable, "-c", _PUSHES, str(port), recording_id, _FORGED],
-            check=False, capture_output=True, text=True, timeout=BOUND,
+            check=False, capture_output=True, text=True, timeout=TIMEOUT_S,
         )  # fmt: skip
         assert push.stdout == "pushed\n", push.stderr
         began = status(process.pid)["t_s"]
         until(lambda: status(process.pid)["t_s"] > began + 1.5, "the run went on")
         process.terminate()
-        _, said = process.communicate(timeout=BOUND)
+        _, said = process.communicate(timeout=TIMEOUT_S)
     assert "FORGED" not in said
     (kept,) = (tmp_path / "runs").iterdir()
     recorded = read_run(kept)
@@ -149,11 +149,11 @@ def test_sockets_are_this_user_s_alone_and_the_kernel_says_who_knocks(tmp_path: 
         assert stat.S_IMODE(place.stat().st_mode) & 0o077 == 0
         assert stat.S_IMODE(folder().stat().st_mode) == 0o700
         with _as_another_user(_KNOCKS, str(place)) as refused:
-            assert refused.communicate(timeout=BOUND)[0] == "PermissionError\n"
+            assert refused.communicate(timeout=TIMEOUT_S)[0] == "PermissionError\n"
         for path in (place.parents[1], place.parent, place):  # as if every mode were wrong
             path.chmod(0o777)
         with _as_another_user(_KNOCKS, str(place)) as unanswered:
-            said = unanswered.communicate(timeout=BOUND)[0]
+            said = unanswered.communicate(timeout=TIMEOUT_S)[0]
         assert said in {"answer b''\n", "ConnectionResetError\n", "BrokenPipeError\n"}
         for path in (place.parents[1], place.parent):
             path.chmod(0o700)

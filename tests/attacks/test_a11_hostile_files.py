@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 _MOST_MB = 500
 _MOST_CPU = 20.0  # s: of a file that is made to take long
-_LONGEST = 30_000  # characters printed
-_FEWEST = 35
+_OUTPUT_CHARS_MAX = 30_000  # characters printed
+_CASES_MIN = 35
 _CONTROL = [chr(code) for code in (*range(0x20), 0x7F, *range(0x80, 0xA0), 0x202E) if chr(code) not in "\n\t"]
 
 
@@ -60,7 +60,7 @@ def _judge(found: list[dict[str, Any]], codes: set[int]) -> None:
             and "Warning:" not in printed
             and not any(character in printed for character in _CONTROL)
             and (one["code"] == 0 or "error: " in printed)
-            and one["long"] < _LONGEST
+            and one["long"] < _OUTPUT_CHARS_MAX
             and one["cpu"] < _MOST_CPU
             and one["MB"] < _MOST_MB
         )
@@ -71,7 +71,7 @@ def _judge(found: list[dict[str, Any]], codes: set[int]) -> None:
 
 def test_every_hostile_recording_is_a_sentence(tmp_path: Path) -> None:
     files = recordings()
-    assert len(files) > _FEWEST
+    assert len(files) > _CASES_MIN
     found = _read_all(tmp_path / "files", "mcap", files)
     assert len(found) == 2 * len(files)
     _judge(found, {0, 2, 6})

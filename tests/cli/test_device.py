@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("needs_compiler")
 
-_BOUND = 60.0  # s: generous, these machines are shared
+_TIMEOUT_S = 60.0  # s: generous, these machines are shared
 
 
 @contextmanager
@@ -40,7 +40,7 @@ def running(folder: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[st
         yield process, process.stdout.readline().strip()
     finally:
         process.kill()
-        process.communicate(timeout=_BOUND)
+        process.communicate(timeout=_TIMEOUT_S)
 
 
 def children(pid: int) -> list[int]:
@@ -49,7 +49,7 @@ def children(pid: int) -> list[int]:
 
 def end(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str]:
     process.send_signal(number)
-    _, err = process.communicate(timeout=_BOUND)
+    _, err = process.communicate(timeout=_TIMEOUT_S)
     return process.returncode, err
 
 
@@ -71,8 +71,8 @@ def test_firmware_goes_when_its_plant_is_killed(tmp_path: Path) -> None:
         (firmware,) = children(process.pid)
         held = os.pidfd_open(firmware)
         process.kill()
-        process.wait(_BOUND)
-        assert select.select([held], [], [], _BOUND)[0] == [held]
+        process.wait(_TIMEOUT_S)
+        assert select.select([held], [], [], _TIMEOUT_S)[0] == [held]
         os.close(held)
         assert not Path(port).exists()
 
@@ -97,11 +97,11 @@ def test_terminal_is_shown_how_things_stand(tmp_path: Path) -> None:
     os.close(terminal)
     try:
         shown = b""
-        while b" rad" not in shown and select.select([screen], [], [], _BOUND)[0]:
+        while b" rad" not in shown and select.select([screen], [], [], _TIMEOUT_S)[0]:
             shown += os.read(screen, 4096)
     finally:
         process.send_signal(signal.SIGINT)
-        assert process.wait(_BOUND) == 0
+        assert process.wait(_TIMEOUT_S) == 0
         os.close(screen)
     for word in (b"tick", b"closed", b"IDLE", b"no session", b"+0.000 V", b" rad"):
         assert word in shown
@@ -110,7 +110,7 @@ def test_terminal_is_shown_how_things_stand(tmp_path: Path) -> None:
 def test_python_can_s_own_slcan_bus_hears_it(tmp_path: Path) -> None:
     with running(tmp_path, "--link", "slcan") as (process, port):
         with can.Bus(channel=port, interface="slcan", ignore_config=True, sleep_after_open=0.0) as bus:
-            heard = [bus.recv(_BOUND) for _ in range(200)]
+            heard = [bus.recv(_TIMEOUT_S) for _ in range(200)]
         assert end(process, signal.SIGINT)[0] == 0
     found = [message for message in heard if message is not None]
     assert len(found) == 200

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Script = Callable[..., Finished]
 
-BOUND = 120.0  # s
+TIMEOUT_S = 120.0  # s
 
 
 def everything(folder: Path) -> dict[str, tuple[int, int, int]]:
@@ -151,7 +151,7 @@ def test_current_folder_that_is_gone_is_told_in_a_line(installed: Path, tmp_path
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=BOUND,
+        timeout=TIMEOUT_S,
         check=False,
     )
     assert (done.returncode, done.stdout) == (2, "")
@@ -168,7 +168,7 @@ def limited(installed: Path, folder: Path, *arguments: str) -> Finished:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=BOUND,
+        timeout=TIMEOUT_S,
         check=False,
     )
     return Finished(done.returncode, done.stdout, done.stderr)
@@ -219,12 +219,12 @@ def test_trip_stays_the_end_of_a_run_whose_json_cannot_be_written(installed: Pat
         stderr=subprocess.PIPE,
         text=True,
     )
-    end = time.monotonic() + BOUND
+    end = time.monotonic() + TIMEOUT_S
     while not any(path.stat().st_size > 30_000 for path in tmp_path.glob("runs/*/run.mcap")):
         assert time.monotonic() < end
         time.sleep(0.05)
     shutil.rmtree(tmp_path / "place")
-    out, err = run.communicate(timeout=BOUND)
+    out, err = run.communicate(timeout=TIMEOUT_S)
     assert run.returncode == 4
     assert "velocity error" in out
     assert err.count("warning: --json place/x.json: No such file or directory") == 1

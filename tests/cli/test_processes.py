@@ -13,7 +13,7 @@ import pytest
 from dcmp_hil.cli.run_sinks import dashboard, status_line
 from tests.telemetry.runs import entities
 
-_BOUND = 60.0  # s: generous, these machines are shared
+_TIMEOUT_S = 60.0  # s: generous, these machines are shared
 
 
 def _start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
@@ -28,7 +28,7 @@ def _start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
 
 def _wait_until_it_records(folder: Path) -> Path:
     """Wait until the first blocks are in the recording: the run is really under way."""
-    deadline = time.monotonic() + _BOUND
+    deadline = time.monotonic() + _TIMEOUT_S
     while time.monotonic() < deadline:
         for recording in folder.glob("runs/*/run.rrd"):
             if recording.stat().st_size > 450_000:  # half of it is known before the first period
@@ -46,7 +46,7 @@ def test_run_keeps_what_was_recorded_when_signalled(
     process = _start(tmp_path, "--duration", "0", "--json", "figures.json")
     folder = _wait_until_it_records(tmp_path)
     process.send_signal(number)
-    out, err = process.communicate(timeout=_BOUND)
+    out, err = process.communicate(timeout=_TIMEOUT_S)
     figures = json.loads((folder / "summary.json").read_text())
     assert process.returncode == code, err
     assert "Traceback" not in err
@@ -60,13 +60,13 @@ def test_recording_is_whole_when_killed(tmp_path: Path) -> None:
     process = _start(tmp_path, "--duration", "0")
     folder = _wait_until_it_records(tmp_path)
     process.kill()
-    process.communicate(timeout=_BOUND)  # until the telemetry process has left, too
+    process.communicate(timeout=_TIMEOUT_S)  # until the telemetry process has left, too
     assert "joint/position_rad" in entities(folder / "run.rrd")
 
 
 def test_run_is_paced_by_the_wall_when_not_fast(tmp_path: Path) -> None:
     process = _start(tmp_path, "--duration", "1", "--no-record", "--json", "-")
-    out, err = process.communicate(timeout=_BOUND)
+    out, err = process.communicate(timeout=_TIMEOUT_S)
     figures = json.loads(out)
     assert process.returncode == 0, err
     assert figures["periods"] == 1000
@@ -114,7 +114,7 @@ def test_a_way_to_a_viewer_that_is_stuck_does_not_hold_the_exit_up(arguments: li
         [sys.executable, "-c", _STUCK, *arguments],
         capture_output=True,
         text=True,
-        timeout=_BOUND,
+        timeout=_TIMEOUT_S,
         check=False,
     )
     assert done.returncode == code

@@ -12,7 +12,7 @@ import pytest
 
 from dcmp_hil.live import run_sockets
 from tests.installed import started
-from tests.live.processes import BOUND, own_folder, runs, until, until_running
+from tests.live.processes import TIMEOUT_S, own_folder, runs, until, until_running
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,7 +53,7 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
         until_running(run)
         watchers = [socket.socket(socket.AF_UNIX) for _ in range(3)]
         for watcher in watchers:
-            watcher.settimeout(BOUND)
+            watcher.settimeout(TIMEOUT_S)
             watcher.connect(str(run_sockets.socket_of(run.pid)))
         watchers[0].sendall(b'{"do": "watch"}\n')  # as a panel does; the second one asks for nothing
         watchers[2].sendall(b'{"do": "wat')  # in the middle of a request
@@ -65,7 +65,7 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
             run.send_signal(signal.SIGINT)
         with lines:
             last = list(lines)[-1]
-        _, err = run.communicate(timeout=BOUND)
+        _, err = run.communicate(timeout=TIMEOUT_S)
         for watcher in watchers:
             watcher.close()
     assert json.loads(last) == {"ended": "Amplifier at 0 V.", "at_zero": True}
@@ -126,7 +126,7 @@ def _unplugged(installed: Path, folder: Path) -> tuple[int | None, str]:
         with started(installed, folder, "run", *options) as run:
             until(lambda: run.poll() is not None or runs(run.pid), "the run got under way")
             device.kill()
-            _, err = run.communicate(timeout=BOUND)
+            _, err = run.communicate(timeout=TIMEOUT_S)
     port.unlink(missing_ok=True)
     return run.returncode, err
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Script = Callable[..., Finished]
 
 BASH = shutil.which("bash")
-BOUND = 120.0  # s: these machines are shared
+TIMEOUT_S = 120.0  # s: these machines are shared
 KEPT = {"summary.json", "run.mcap", "run.rrd", "run.png"}
 TRIP = "run --fast --duration 6 --viewer none --fault plant.enc_stuck:at=3s"
 
@@ -47,7 +47,7 @@ def shell(installed: Path, folder: Path, command: str, **env: str | None) -> tup
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         errors="surrogateescape",
-        timeout=BOUND,
+        timeout=TIMEOUT_S,
         check=False,
     )
     return done.returncode, done.stdout
@@ -98,7 +98,7 @@ def test_run_ends_well_when_ctrl_c_ends_its_reader_too(installed: Path, tmp_path
     )
     wait_until_it_runs(tmp_path)
     os.killpg(shell_process.pid, signal.SIGINT)  # as a terminal sends it: to the whole pipeline
-    shell_process.wait(BOUND)
+    shell_process.wait(TIMEOUT_S)
     wait_for(lambda: (tmp_path / "code").exists() or any(tmp_path.glob("runs/*/summary.json")))
     (run,) = (tmp_path / "runs").iterdir()
     figures = json.loads((run / "summary.json").read_text())
@@ -196,7 +196,7 @@ def test_monitor_ends_when_its_reader_leaves(installed: Path, tmp_path: Path) ->
         assert "Traceback" not in (tmp_path / "log.txt").read_text()
     finally:
         device.terminate()
-        device.wait(BOUND)
+        device.wait(TIMEOUT_S)
         if device.stdout is not None:
             device.stdout.close()
 
@@ -210,7 +210,7 @@ def wait_until_it_runs(folder: Path) -> None:
 
 
 def wait_for(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + BOUND
+    end = time.monotonic() + TIMEOUT_S
     while not what():
         assert time.monotonic() < end
         time.sleep(0.05)

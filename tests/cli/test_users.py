@@ -14,8 +14,8 @@ from tests.installed import environment
 if TYPE_CHECKING:
     from pathlib import Path
 
-STRANGER = 20_000 + os.getpid() % 40_000  # a folder in /tmp may be left of another one
-AS_STRANGER = ["unshare", "--user", f"--map-user={STRANGER}", f"--map-group={STRANGER}"]
+OTHER_USER_ID = 20_000 + os.getpid() % 40_000  # a folder in /tmp may be left of another one
+AS_STRANGER = ["unshare", "--user", f"--map-user={OTHER_USER_ID}", f"--map-group={OTHER_USER_ID}"]
 
 
 def as_stranger(
@@ -49,19 +49,21 @@ def test_virtual_device_is_compiled_where_there_is_no_home(installed: Path, tmp_
     ] == []
     (run,) = (tmp_path / "runs").iterdir()
     assert {path.name for path in run.iterdir()} == {"summary.json", "run.mcap", "run.rrd", "run.png"}
-    cache = place / f"dcmp-hil-{STRANGER}"
+    cache = place / f"dcmp-hil-{OTHER_USER_ID}"
     assert cache.stat().st_mode & 0o777 == 0o700
     assert [path.name[:8] for path in cache.rglob("*.so")] == ["libdcmp-"]
 
 
 def test_cache_that_others_may_write_is_refused(installed: Path, tmp_path: Path) -> None:
     """A library that another user put there would be loaded into the run."""
-    (tmp_path / f"dcmp-hil-{STRANGER}").mkdir()
-    (tmp_path / f"dcmp-hil-{STRANGER}").chmod(0o777)
+    (tmp_path / f"dcmp-hil-{OTHER_USER_ID}").mkdir()
+    (tmp_path / f"dcmp-hil-{OTHER_USER_ID}").chmod(0o777)
     command = ("run", "--fast", "--duration", "1", "--no-record", "--set", "backend.kind=sim-board")
     done = as_stranger(installed, tmp_path, *command, TMPDIR=str(tmp_path))
     assert (done.returncode, done.stdout) == (3, "")
-    assert done.stderr.startswith(f"error: {tmp_path}/dcmp-hil-{STRANGER}: it is no folder of yours alone.")
+    assert done.stderr.startswith(
+        f"error: {tmp_path}/dcmp-hil-{OTHER_USER_ID}: it is no folder of yours alone."
+    )
     assert done.stderr.count("\n") == 1
     assert "XDG_CACHE_HOME" in done.stderr
 

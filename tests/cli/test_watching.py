@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.rerun.sink import Viewer
 
-_FIRST = 25_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # each process its own ports
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+_FIRST_PORT = 25_000 + 1000 * _WORKER  # each process its own ports
 
 
 @pytest.fixture(autouse=True)
 def _elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take ports that no run on this computer takes, and no display."""
-    monkeypatch.setattr(window, "VIEWER_PORT", _FIRST)
-    monkeypatch.setattr(window, "WEB_PORT", _FIRST + 500)
-    monkeypatch.setattr(window.served, "__defaults__", (_FIRST,))
+    monkeypatch.setattr(window, "VIEWER_PORT", _FIRST_PORT)
+    monkeypatch.setattr(window, "WEB_PORT", _FIRST_PORT + 500)
+    monkeypatch.setattr(window.served, "__defaults__", (_FIRST_PORT,))
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
 
@@ -40,7 +41,7 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def run() -> Iterator[RerunSink]:
     """Serve a run."""
-    sink = RerunSink(VIEW, None, "serve", port=_FIRST)
+    sink = RerunSink(VIEW, None, "serve", port=_FIRST_PORT)
     assert sink.port is not None
     assert window.answers(sink.port, 5.0)
     yield sink
@@ -75,18 +76,18 @@ def test_a_served_run_says_where_it_is_served_and_not_where_it_was_to_be(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with _taken() as taken:  # between the look for a free port and its use
-        free = window.free_ports(_FIRST)
+        free = window.free_ports(_FIRST_PORT)
         monkeypatch.setattr(window, "free_ports", lambda _: iter([taken, next(free)]))
         sink = dashboard(VIEW, None, "serve", taken)
-        assert f"rerun --connect rerun+http://127.0.0.1:{_FIRST}/proxy" in said(capsys)
-        assert window.speaks_http2(_FIRST, 60.0)
+        assert f"rerun --connect rerun+http://127.0.0.1:{_FIRST_PORT}/proxy" in said(capsys)
+        assert window.speaks_http2(_FIRST_PORT, 60.0)
         sink.close()
 
 
 @pytest.mark.parametrize("viewer", ["connect", "none"])
 def test_other_ways_are_the_sink_s_own_business(viewer: Viewer, capsys: pytest.CaptureFixture[str]) -> None:
     assert chosen(viewer) == viewer
-    sink = dashboard(VIEW, None, viewer, _FIRST)
+    sink = dashboard(VIEW, None, viewer, _FIRST_PORT)
     assert isinstance(sink, RerunSink)
     sink.close()
     assert not said(capsys)
@@ -97,29 +98,29 @@ def test_without_a_free_port_the_run_goes_on_unwatched(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window, "free_ports", lambda _: iter([]))
-    sink = dashboard(VIEW, None, viewer, _FIRST)
+    sink = dashboard(VIEW, None, viewer, _FIRST_PORT)
     assert "No port from" in sink.warnings[0]  # type: ignore[attr-defined]
     sink.close()
 
 
 def test_pages_are_served_on_loopback_as_long_as_the_run_lasts(capsys: pytest.CaptureFixture[str]) -> None:
-    sink = dashboard(VIEW, None, "web", _FIRST)
+    sink = dashboard(VIEW, None, "web", _FIRST_PORT)
     address = said(capsys).removeprefix("web viewer: ")
-    assert address == window.web_url(_FIRST + 500, _FIRST)
+    assert address == window.web_url(_FIRST_PORT + 500, _FIRST_PORT)
     with urllib.request.urlopen(address, timeout=60.0) as page:  # noqa: S310 - our own
         assert page.status == 200
         assert b"<html" in page.read().lower()
     sink.close()
-    assert not window.answers(_FIRST + 500, 0.1)
+    assert not window.answers(_FIRST_PORT + 500, 0.1)
 
 
 def test_pages_are_told_where_they_are_and_not_where_they_were_to_be(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with _taken() as taken:
-        monkeypatch.setattr(window, "free_ports", lambda _: iter([taken, _FIRST + 700]))
-        with pages(_FIRST) as address:
-            assert address == window.web_url(_FIRST + 700, _FIRST)
+        monkeypatch.setattr(window, "free_ports", lambda _: iter([taken, _FIRST_PORT + 700]))
+        with pages(_FIRST_PORT) as address:
+            assert address == window.web_url(_FIRST_PORT + 700, _FIRST_PORT)
     assert not said(capsys)
 
 
@@ -130,7 +131,7 @@ def test_a_web_viewer_that_does_not_start_costs_a_sentence(
         raise FileNotFoundError("no such program")
 
     monkeypatch.setattr(window, "start_web_viewer", missing)
-    dashboard(VIEW, None, "web", _FIRST).close()
+    dashboard(VIEW, None, "web", _FIRST_PORT).close()
     assert "No web viewer (no such program); to watch: dcmp-hil view" in said(capsys)
 
 
@@ -170,13 +171,13 @@ def test_view_without_a_display_says_what_else_there_is() -> None:
 def test_view_without_a_run_says_how_to_start_one() -> None:
     with pytest.raises(ConfigError, match="No run is served"):
         attach(None, web=False)
-    with pytest.raises(ConfigError, match=f"No run is served on .*:{_FIRST + 333}"):
-        attach(_FIRST + 333, web=False)
+    with pytest.raises(ConfigError, match=f"No run is served on .*:{_FIRST_PORT + 333}"):
+        attach(_FIRST_PORT + 333, web=False)
 
 
 @pytest.mark.usefixtures("run")
 def test_view_of_several_asks_which() -> None:
-    other = RerunSink(VIEW, None, "serve", port=_FIRST)
+    other = RerunSink(VIEW, None, "serve", port=_FIRST_PORT)
     assert other.port is not None
     assert window.answers(other.port, 5.0)
     with pytest.raises(ConfigError, match=r"Several are served: .* Name one with --port"):
@@ -188,10 +189,10 @@ def test_a_page_ends_with_its_run(run: RerunSink, monkeypatch: pytest.MonkeyPatc
     looks = []
 
     def look(_: float) -> None:
-        looks.append(window.answers(_FIRST + 500, 0.1))
+        looks.append(window.answers(_FIRST_PORT + 500, 0.1))
         run.close()
 
     monkeypatch.setattr("dcmp_hil.cli.execute_view.pause", look)
     attach(run.port, web=True)
     assert looks[0]
-    assert not window.answers(_FIRST + 500, 0.1)
+    assert not window.answers(_FIRST_PORT + 500, 0.1)

@@ -18,7 +18,7 @@ from dcmp_hil.errors import ConfigError
 
 FOLDER = Path(__file__).parents[2] / "dcmp_hil/rigs"
 BASES = [tomllib.loads((FOLDER / f"{name}.toml").read_text()) for name in ("bench-1khz", "paper")]
-MUTATIONS = 2500
+MUTATION_COUNT = 2500
 JARGON = (
     "Input should",
     "type=",
@@ -136,18 +136,18 @@ def hold_to_promises(faults: tuple[str, ...], keys: set[str]) -> None:
 @pytest.mark.parametrize("part", range(4))
 def test_load_gives_rig_or_faults_that_name_a_key_when_file_is_mutated(tmp_path: Path, part: int) -> None:
     rng, path, loaded = random.Random(part), tmp_path / "mutated.toml", 0
-    for _ in range(MUTATIONS // 4):
+    for _ in range(MUTATION_COUNT // 4):
         table = mutate(rng)
         path.write_text(document(table))
         faults = faults_of(path)
         hold_to_promises(faults, {*keys_of(table), "file"})  # a csv reference misses its file
         loaded += not faults
-    assert 0.02 < loaded / (MUTATIONS // 4) < 0.6  # both outcomes are exercised
+    assert 0.02 < loaded / (MUTATION_COUNT // 4) < 0.6  # both outcomes are exercised
 
 
 def test_load_gives_rig_or_faults_that_name_a_key_when_overrides_are_mutated() -> None:
     rng, loaded = random.Random(7), 0
-    for _ in range(MUTATIONS):
+    for _ in range(MUTATION_COUNT):
         table = rng.choice([name for name, value in BASES[0].items() if isinstance(value, dict)])
         key = rng.choice([*BASES[0][table], "kind"])
         value = BASES[0][table].get(key, 0) if rng.random() < 0.3 else rng.choice(VALUES)
@@ -158,13 +158,13 @@ def test_load_gives_rig_or_faults_that_name_a_key_when_overrides_are_mutated() -
         hold_to_promises(faults, {table} if "" in parts else {*parts, "file"})
         assert all(fault.startswith("--set ") for fault in faults), faults
         loaded += not faults
-    assert 0.02 < loaded / MUTATIONS < 0.6
+    assert 0.02 < loaded / MUTATION_COUNT < 0.6
 
 
 def test_schema_accepts_every_mutated_file_that_loads(tmp_path: Path) -> None:
     validator = jsonschema.Draft202012Validator(rig_schema())
     rng, path, loaded = random.Random(11), tmp_path / "mutated.toml", 0
-    for _ in range(MUTATIONS // 4):
+    for _ in range(MUTATION_COUNT // 4):
         table = mutate(rng)
         path.write_text(document(table))
         if not faults_of(path):

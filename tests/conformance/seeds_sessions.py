@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tests.conformance.seed import Seed
 from tests.contract import reference_wire as wire
-from tests.contract.reference_device import HASH, VERSION
+from tests.contract.reference_device import FIRMWARE_VERSION, HASH
 from tests.contract.reference_wire import ARMING, RUN
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ class UnknownIsZero(Seed):
 
 
 def _hash(_session: int, _owner: int, said: bytes) -> bytes:
-    return struct.pack("<IH", HASH ^ 0x1000, VERSION) + said[6:]
+    return struct.pack("<IH", HASH ^ 0x1000, FIRMWARE_VERSION) + said[6:]
 
 
 def _no_mismatch(_session: int, _owner: int, said: bytes) -> bytes:

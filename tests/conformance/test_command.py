@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Script = Callable[..., Finished]
 
-BOUND = 120.0  # s, of one process: these machines are shared
+TIMEOUT_S = 120.0  # s, of one process: these machines are shared
 WARNING = "warning: With --arm the motor is switched on"
 
 
@@ -58,7 +58,7 @@ def virtual_device() -> Iterator[VirtualDevice]:
 
 
 def wait_for(holds: Callable[[], bool]) -> None:
-    until = time.monotonic() + BOUND
+    until = time.monotonic() + TIMEOUT_S
     while not holds():
         assert time.monotonic() < until
         time.sleep(0.001)
@@ -67,7 +67,7 @@ def wait_for(holds: Callable[[], bool]) -> None:
 @pytest.mark.parametrize("link", ["cobs", "slcan"])
 def test_the_virtual_device_passes(script: Script, installed: Path, tmp_path: Path, link: str) -> None:
     with device_command(installed, tmp_path, link) as port:
-        done = script("conform", port, "--arm", "--yes", "--json", "conform.json", timeout=BOUND)
+        done = script("conform", port, "--arm", "--yes", "--json", "conform.json", timeout=TIMEOUT_S)
     report = json.loads((tmp_path / "conform.json").read_text("utf-8"))
     assert {one["name"]: one["findings"] for one in report["checks"] if one["verdict"] == "failed"} == {}
     assert done.code == 0
@@ -84,7 +84,7 @@ def test_the_virtual_device_passes(script: Script, installed: Path, tmp_path: Pa
 
 def test_without_arm_nothing_is_armed(script: Script, tmp_path: Path) -> None:
     with virtual_device() as device:
-        done = script("conform", device.port, "--json", "-", timeout=BOUND)
+        done = script("conform", device.port, "--json", "-", timeout=TIMEOUT_S)
         assert not any(output.enable or output.voltage_mV for output in device.log)
     report = json.loads(done.out)
     assert done.code == 0, done.err
@@ -101,7 +101,7 @@ def test_the_device_is_off_however_it_ends(installed: Path, tmp_path: Path, numb
         with started(installed, tmp_path, *arguments) as process:
             wait_for(lambda: device.output.voltage_mV != 0)
             process.send_signal(number)
-            out, err = process.communicate(timeout=BOUND)
+            out, err = process.communicate(timeout=TIMEOUT_S)
             wait_for(lambda: not device.output.enable and device.output.voltage_mV == 0)
             ticks = device.tick_count
             wait_for(lambda: device.tick_count > ticks + 100)
@@ -134,7 +134,7 @@ def faulty(error: str) -> Iterator[str]:
         yield port.path
     finally:
         ending.set()
-        thread.join(BOUND)
+        thread.join(TIMEOUT_S)
         port.close()
 
 
@@ -142,7 +142,7 @@ def test_an_error_of_a_device_is_named(script: Script) -> None:
     error = "crc16 is not checked"
     *_, name = SEEDS[error]
     with faulty(error) as port:
-        done = script("conform", port, "--only", name, "--only", "identity", "--json", "-", timeout=BOUND)
+        done = script("conform", port, "--only", name, "--only", "identity", "--json", "-", timeout=TIMEOUT_S)
     report = json.loads(done.out)
     assert done.code == 1, done.err
     assert {one["name"]: one["verdict"] for one in report["checks"]} == {name: "failed", "identity": "passed"}
@@ -227,7 +227,7 @@ def test_a_person_is_asked(installed: Path, tmp_path: Path, answer: str, code: i
                 stdin=slave,
                 capture_output=True,
                 text=True,
-                timeout=BOUND,
+                timeout=TIMEOUT_S,
                 check=False,
             )
             ran = any(output.enable for output in device.log)

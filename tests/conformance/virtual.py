@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dcmp_hil.conformance.lines import CarrierLine
     from dcmp_hil.wire.frame import Frame
 
-ROOM = 4096  # bytes that a port keeps for a host that does not read
+PORT_BYTES_MAX = 4096  # bytes that a port keeps for a host that does not read
 
 
 class Arm:

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from tests.contract import reference_wire as wire
 from tests.contract.reference_wire import RUN
 
-OURS, THEIRS = 0x1234, 0x4321
+OUR_SESSION, OTHER_SESSION = 0x1234, 0x4321
 HASH = wire.protocol_hash()
 
 
@@ -92,14 +92,14 @@ class Host:
         clear: int = 0,
         release: int = 0,
         back: int = 0,
-        session: int = OURS,
+        session: int = OUR_SESSION,
         ttl_ms: int = 50,
     ) -> None:
         """Answer the SAMPLE `back` before the newest."""
         word = (self.ticks - back) % 8192 * 8 + arm + 2 * clear + 4 * release
         self.send(wire.DRIVE, struct.pack("<hHHB", voltage_mV, word, session, ttl_ms))
 
-    def hello(self, session: int = OURS, hash_: int = HASH) -> str:
+    def hello(self, session: int = OUR_SESSION, hash_: int = HASH) -> str:
         """Return the letters of the flags that IDENTITY says."""
         self.send(wire.HELLO, struct.pack("<HI", session, hash_))
         ((number, content),) = self.collect()
@@ -112,7 +112,7 @@ class Host:
         self.send(wire.GET, bytes([id_]))
         return self.value(id_)
 
-    def put(self, id_: int, value: int, session: int = OURS) -> tuple[int, int]:
+    def put(self, id_: int, value: int, session: int = OUR_SESSION) -> tuple[int, int]:
         self.send(wire.SET, struct.pack("<HBi", session, id_, value))
         return self.value(id_)
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 HASH = wire.protocol_hash()
-VERSION = 1 * 256 + 0
+FIRMWARE_VERSION = 1 * 256 + 0
 
 
 @dataclass(kw_only=True, eq=False)
@@ -114,7 +114,7 @@ class ReferenceDevice:
         """Return the frames for the host since the last call."""
         if not self._link_up:
             return []
-        self._set[wire.TICK] = self.tick_count & wire.LARGEST
+        self._set[wire.TICK] = self.tick_count & wire.VALUE_MAX
         told = self._parameters.told
         contents = [(n, told(*c) if n == wire.VALUE else c) for n, c in self._outbox.take()]
         return [wire.frame(number, self.node, content) for number, content in contents] * self._line.open
@@ -192,7 +192,7 @@ class ReferenceDevice:
             self._heard_us = self.now_us
         owned = session != 0 and self._owner == session
         flags = (self._owner != 0 and not owned) + 2 * owned + 4 * (theirs != HASH)
-        self._outbox.answer(wire.IDENTITY, struct.pack("<IHB", HASH, VERSION, flags))
+        self._outbox.answer(wire.IDENTITY, struct.pack("<IHB", HASH, FIRMWARE_VERSION, flags))
 
     def _on_get(self, content: bytes) -> None:
         self._outbox.answer(wire.VALUE, bytes([content[0], 0 if content[0] in self._set else wire.UNKNOWN]))
@@ -284,7 +284,7 @@ class ReferenceDevice:
 
     def _latch_fault(self, code: int, detail: int) -> None:
         self._cut(FAULTED)
-        self._fault = (code, self.tick_count, max(-wire.LARGEST - 1, min(detail, wire.LARGEST)))
+        self._fault = (code, self.tick_count, max(-wire.VALUE_MAX - 1, min(detail, wire.VALUE_MAX)))
         self._fault_fresh, self._may_clear = True, False
 
     def _cut(self, state: int) -> None:

@@ -25,7 +25,7 @@ BOARD, BOOT_COUNT, RESET_CAUSE, TICK, COUNTS_PER_REV, PERIOD_US = range(1, 7)
 VOLTAGE_LIMIT, SLEW, WATCHDOG, SPEED_LIMIT, TRAVEL_LIMIT, EDGE_STAMPS = range(7, 13)
 LAST_FAULT, LAST_FAULT_DETAIL, SUPPLY, TRAVEL_ORIGIN = 13, 14, 15, 16
 
-LARGEST = 2**31 - 1
+VALUE_MAX = 2**31 - 1
 COBS_LONGEST = 13
 SLCAN_LONGEST = 31
 
@@ -219,7 +219,7 @@ class Parameters:
             | facts
         )
         self._highest = limits | {
-            SLEW: limits[SLEW] or LARGEST,
+            SLEW: limits[SLEW] or VALUE_MAX,
             EDGE_STAMPS: 0,  # no stamps here
             TRAVEL_ORIGIN: 2**24 - 1,
         }

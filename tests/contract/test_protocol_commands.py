@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.contract import reference_wire as wire
-from tests.contract.protocol_host import THEIRS, Host
+from tests.contract.protocol_host import OTHER_SESSION, Host
 from tests.contract.reference_wire import ARMING, IDLE, RUN
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def test_what_is_not_the_owners_or_not_in_range_feeds_nothing(ready: Host) -> No
     ready.drive(arm=1, clear=1)
     ready.drive(arm=1, release=1)
     ready.drive(clear=1, release=1)
-    ready.drive(arm=1, session=THEIRS)
+    ready.drive(arm=1, session=OTHER_SESSION)
     ready.drive(arm=1, session=0)
     assert ready.tick().missed
     assert ready.tick().state == IDLE
@@ -142,4 +142,4 @@ def test_run_ends_at_once(running: Host, word: dict[str, int]) -> None:
     assert (running.device.applied_mV, running.device.enable) == (0, False)
     sample = running.tick()
     assert (sample.state, sample.voltage_mV, sample.fault_class) == (IDLE, 0, 0)
-    assert running.hello(THEIRS) == ("o" if "release" in word else "b")
+    assert running.hello(OTHER_SESSION) == ("o" if "release" in word else "b")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.contract import reference_wire as wire
-from tests.contract.protocol_host import THEIRS, Device, Host
+from tests.contract.protocol_host import OTHER_SESSION, Device, Host
 from tests.contract.reference_wire import ARMING, FAULTED, IDLE, RUN
 
 if TYPE_CHECKING:
@@ -71,13 +71,13 @@ def test_a_fault_is_cleared_by_two_drives_of_one_session(ready: Host) -> None:
     assert after(clear=1) == FAULTED  # no DRIVE without clear since the fault
     assert after(arm=1) == FAULTED
     assert after(release=1) == FAULTED
-    assert ready.hello(THEIRS) == "o"
-    assert after(clear=1, session=THEIRS) == FAULTED  # the other one's DRIVE does not count
-    assert after(session=THEIRS) == FAULTED
-    assert after(clear=1, voltage_mV=1, session=THEIRS) == FAULTED
-    assert after(clear=1, session=THEIRS) == IDLE
+    assert ready.hello(OTHER_SESSION) == "o"
+    assert after(clear=1, session=OTHER_SESSION) == FAULTED  # the other one's DRIVE does not count
+    assert after(session=OTHER_SESSION) == FAULTED
+    assert after(clear=1, voltage_mV=1, session=OTHER_SESSION) == FAULTED
+    assert after(clear=1, session=OTHER_SESSION) == IDLE
     ready.send(wire.STOP, b"\0")
-    assert after(clear=1, session=THEIRS) == FAULTED  # each fault anew
+    assert after(clear=1, session=OTHER_SESSION) == FAULTED  # each fault anew
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.contract import reference_wire as wire
-from tests.contract.protocol_host import HASH, OURS, THEIRS, Host
+from tests.contract.protocol_host import HASH, OTHER_SESSION, OUR_SESSION, Host
 from tests.contract.reference_wire import ARMING, IDLE, RUN
 
 if TYPE_CHECKING:
@@ -36,29 +36,29 @@ def test_hello_finds_an_owner(host: Callable[..., Host]) -> None:
     h.tick()
     assert h.hello(0) == ""
     assert h.hello(0, HASH ^ 1) == "m"
-    assert h.hello(OURS, HASH ^ 1) == "m"
-    assert h.hello(OURS) == "o"
-    assert h.hello(THEIRS) == "b"
+    assert h.hello(OUR_SESSION, HASH ^ 1) == "m"
+    assert h.hello(OUR_SESSION) == "o"
+    assert h.hello(OTHER_SESSION) == "b"
     assert h.hello(0) == "b"
-    assert h.hello(OURS) == "o"
+    assert h.hello(OUR_SESSION) == "o"
 
 
 def test_ownership_ends_by_silence_or_release(ready: Host) -> None:
     for _ in range(490):
         ready.tick()
-    ready.drive(session=THEIRS)  # no owner's
+    ready.drive(session=OTHER_SESSION)  # no owner's
     ready.drive(back=4)  # too old
-    assert ready.hello(THEIRS) == "b"
+    assert ready.hello(OTHER_SESSION) == "b"
     assert ready.put(wire.TICK, 1)[0] == wire.READ_ONLY  # counts all the same
     for _ in range(490):
         ready.tick()
-    assert ready.hello(THEIRS) == "b"
-    assert ready.hello(OURS, HASH ^ 1) == "om"  # counts for nothing
+    assert ready.hello(OTHER_SESSION) == "b"
+    assert ready.hello(OUR_SESSION, HASH ^ 1) == "om"  # counts for nothing
     for _ in range(11):
         ready.tick()
-    assert ready.hello(THEIRS) == "o"
-    ready.drive(release=1, session=THEIRS)
-    assert ready.hello(OURS) == "o"
+    assert ready.hello(OTHER_SESSION) == "o"
+    ready.drive(release=1, session=OTHER_SESSION)
+    assert ready.hello(OUR_SESSION) == "o"
 
 
 def test_parameters(host: Callable[..., Host]) -> None:
@@ -75,9 +75,9 @@ def test_parameters(host: Callable[..., Host]) -> None:
     assert h.get(wire.SUPPLY) == (wire.OK, 0)
     assert h.put(wire.VOLTAGE_LIMIT, 5000) == (wire.NOT_OWNER, 10_000)
     h.hello()
-    assert h.put(99, 0, THEIRS) == (wire.UNKNOWN, 0)
-    assert h.put(wire.PERIOD_US, 0, THEIRS) == (wire.READ_ONLY, 1000)
-    assert h.put(wire.VOLTAGE_LIMIT, 10_001, THEIRS) == (wire.OUT_OF_RANGE, 10_000)
+    assert h.put(99, 0, OTHER_SESSION) == (wire.UNKNOWN, 0)
+    assert h.put(wire.PERIOD_US, 0, OTHER_SESSION) == (wire.READ_ONLY, 1000)
+    assert h.put(wire.VOLTAGE_LIMIT, 10_001, OTHER_SESSION) == (wire.OUT_OF_RANGE, 10_000)
     for id_, built in ((wire.VOLTAGE_LIMIT, 10_000), (wire.SPEED_LIMIT, 32_768), (wire.TRAVEL_LIMIT, 16_384)):
         assert h.put(id_, 1) == (wire.OK, 1)
         assert h.put(id_, 0) == h.put(id_, -1) == h.put(id_, built + 1) == (wire.OUT_OF_RANGE, 1)
@@ -87,10 +87,10 @@ def test_parameters(host: Callable[..., Host]) -> None:
     assert h.put(wire.SLEW, 0) == (wire.OUT_OF_RANGE, 0)
     assert h.put(wire.SLEW, 70_000) == (wire.OK, 70_000)
     h.drive(arm=1)
-    assert h.put(wire.SLEW, 1, THEIRS) == (wire.NOT_IDLE, 70_000)
+    assert h.put(wire.SLEW, 1, OTHER_SESSION) == (wire.NOT_IDLE, 70_000)
 
 
-@pytest.mark.parametrize("session", [OURS, THEIRS])
+@pytest.mark.parametrize("session", [OUR_SESSION, OTHER_SESSION])
 def test_the_next_host_finds_the_device_as_it_was_built(ready: Host, session: int) -> None:
     watchdog_ms = ready.get(wire.WATCHDOG)[1]
     assert ready.put(wire.VOLTAGE_LIMIT, 2000) == (wire.OK, 2000)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_PAUSE = 5e-3  # s
+_PAUSE_S = 5e-3  # s
 
 
 class Line:
@@ -48,7 +48,7 @@ def line(said: bytes = b"") -> Iterator[Line]:
     found, ending = Line(), threading.Event()
 
     def babble() -> None:
-        while not ending.wait(_PAUSE):
+        while not ending.wait(_PAUSE_S):
             found.say(said)
 
     thread = threading.Thread(target=babble)

@@ -10,17 +10,17 @@ from dcmp_hil.device.clock_ratio import ClockRatio
 from dcmp_hil.device.node_uniqueness import TickWatch
 from dcmp_hil.wire.messages import SampleReport, State
 
-PERIOD = 1e6  # ns
+PERIOD_NS = 1e6  # ns
 
 
 def arrivals(error: float, ticks: int, seed: int = 1) -> ClockRatio:
     """Let samples arrive late by chance, in fours, and with stops of the computer, on a clock that is off."""
-    ratio, rng = ClockRatio(PERIOD), random.Random(seed)
+    ratio, rng = ClockRatio(PERIOD_NS), random.Random(seed)
     late, heard = 0.0, 0
     for tick in range(5000, 5000 + ticks):
-        late = 50 * PERIOD if rng.random() < 0.002 else max(0.0, late - PERIOD)
+        late = 50 * PERIOD_NS if rng.random() < 0.002 else max(0.0, late - PERIOD_NS)
         batch = 4 * ((tick + 3) // 4)  # an adapter that hands four over at once
-        at = int(batch * PERIOD / (1.0 + error) + late + rng.expovariate(1e-5))
+        at = int(batch * PERIOD_NS / (1.0 + error) + late + rng.expovariate(1e-5))
         heard = max(heard, at)
         ratio.add(tick, heard)
     return ratio
@@ -36,11 +36,11 @@ def test_clock_is_found_in_spite_of_lateness(error: float, seed: int) -> None:
 @pytest.mark.parametrize("right", [2000, 300_000])
 @pytest.mark.parametrize("error", [0.02, -0.02, 0.008])
 def test_clock_that_goes_wrong_later_is_found_within_2200_ticks(right: int, error: float) -> None:
-    ratio = ClockRatio(PERIOD)
+    ratio = ClockRatio(PERIOD_NS)
     for tick in range(0, right, 1 if right < 10_000 else 16):
-        ratio.add(tick, round(tick * PERIOD))
+        ratio.add(tick, round(tick * PERIOD_NS))
     for tick in range(2200):
-        ratio.add(right + tick, round((right + tick / (1.0 + error)) * PERIOD))
+        ratio.add(right + tick, round((right + tick / (1.0 + error)) * PERIOD_NS))
     assert ratio.error == pytest.approx(error, rel=0.01)
 
 

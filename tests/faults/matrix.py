@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 _WHOLE = ((1.3, 1.6), 2.3)  # s: when the fault comes, and the end of the run
 _SHORT = ((0.35, 0.65), 1.35)  # the same without probe and ramp, for faults that do not care for them
 _CARELESS = ("wire.", "host.")
-_AFTERWARDS = 60  # ticks that the board goes on without a host
-_LEASE = 600  # ticks after which the device has forgotten its host
-_REST, _PATIENCE = 200, 60  # ticks that the arm must rest; so many times
+_AFTER_TICKS = 60  # ticks that the board goes on without a host
+_LEASE_TICKS = 600  # ticks after which the device has forgotten its host
+_REST_TICKS, _WAIT_TICKS_MAX = 200, 60  # ticks that the arm must rest; so many times
 _FOLLOWS_WITHIN, _FOLLOWS_MRAD = 2.85, 5.0  # s: 0.85 of start, 2
 _RIG = ("backend.kind=sim-board", "reference.soft_start_s=0.5")
 
@@ -142,7 +142,7 @@ def outcome_of(session: Session) -> str:
 def _verdict(bench: Bench, row: Row, injector: Injector, session: Session, outcome: str) -> Verdict:
     board, oracle = bench.board, bench.oracle
     goes_on = row.bound_ms is None
-    _alone(bench, _AFTERWARDS)
+    _alone(bench, _AFTER_TICKS)
     reaction = math.nan if goes_on else _reaction(bench, injector)
     found = [*oracle.violations]
     if not goes_on and not reaction <= (row.bound_ms or 0.0):
@@ -194,9 +194,9 @@ def start_again(bench: Bench, seed: int) -> tuple[str, ...]:
         bench.again, duration=_FOLLOWS_WITHIN, fast=True, faults=healthy, clear=True
     )  # a person starts it, and from here on the plant is well
     before = len(oracle.violations)
-    _alone(bench, _LEASE)
-    for _ in range(_PATIENCE):
-        if _alone(bench, _REST) == _REST:
+    _alone(bench, _LEASE_TICKS)
+    for _ in range(_WAIT_TICKS_MAX):
+        if _alone(bench, _REST_TICKS) == _REST_TICKS:
             break
     outcome = outcome_of(session)
     found = oracle.violations[before:]

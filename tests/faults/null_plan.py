@@ -11,7 +11,7 @@ from sim_backend.faults.plan import FaultPlan
 from tests.faults.matrix import Verdict, outcome_of
 from tests.faults.oracle import Oracle
 
-LENGTH = 2.5  # s
+DURATION_S = 2.5  # s
 _BELIEVED_KU = 5.4
 _REFERENCES = (
     ("reference.kind=step", "reference.after_rad=1.0", "reference.at_s=0.8", "reference.soft_start_s=0.1"),
@@ -38,5 +38,5 @@ def healthy(seed: int) -> Verdict:
     )
     oracle = Oracle()
     injector = FaultPlan(seed=seed).on(rig, oracle, Board(rig, carrier="cobs"))
-    outcome = outcome_of(Session(rig, duration=LENGTH, fast=True, faults=injector))
+    outcome = outcome_of(Session(rig, duration=DURATION_S, fast=True, faults=injector))
     return Verdict(outcome, outcome == "completed", float("nan"), tuple(oracle.violations))

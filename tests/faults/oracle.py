@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.messages import Message
     from sim_backend.board.board import Board
 
-OLDEST = 3  # ticks at 1 kHz: a command computed from an older sample may not be accepted
-_SEQ, _MOST_SEEN = 0x2000, 1000
+AGE_MAX_TICKS = 3  # ticks at 1 kHz: a command computed from an older sample may not be accepted
+_SEQ, _SEEN_MAX = 0x2000, 1000
 
 
 class Oracle(FaultListener):
@@ -84,7 +84,7 @@ class Oracle(FaultListener):
 
     def _is_good(self, drive: Drive) -> bool:
         assert self._board is not None
-        return drive.session == self._board.owner != 0 and (self._tick - drive.seq) % _SEQ <= OLDEST
+        return drive.session == self._board.owner != 0 and (self._tick - drive.seq) % _SEQ <= AGE_MAX_TICKS
 
     def _judge(self, board: Board) -> None:
         if self._good:
@@ -134,7 +134,7 @@ class Oracle(FaultListener):
             self.off_at = self._ticks
 
     def _note(self, sentence: str) -> None:
-        if len(self.violations) < _MOST_SEEN:
+        if len(self.violations) < _SEEN_MAX:
             self.violations.append(f"tick {self._ticks}: {sentence}")
 
 

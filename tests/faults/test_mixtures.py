@@ -18,8 +18,8 @@ from tests.faults.matrix import outcome_of, same_session
 from tests.faults.oracle import Oracle
 from tests.helpers import bench
 
-SEEDS = 20 * int(os.environ.get("DCMP_FAULT_SEEDS", "2"))
-LENGTH = 1.0  # s
+SEED_COUNT = 20 * int(os.environ.get("DCMP_FAULT_SEEDS", "2"))
+DURATION_S = 1.0  # s
 _FROM_BOOT = 0.15
 ON_PURPOSE = {"completed", "InjectedError", "InjectedBaseError", *(code.name for code in Code)}
 REASONS = {
@@ -50,7 +50,7 @@ def mixed(seed: int) -> tuple[str, list[str], list[str]]:
     oracle = Oracle()
     injector = FaultPlan(faults, seed).on(rig, oracle, Board(rig))
     with same_session(seed):
-        outcome = outcome_of(Session(rig, duration=LENGTH, fast=True, faults=injector))
+        outcome = outcome_of(Session(rig, duration=DURATION_S, fast=True, faults=injector))
     return (
         outcome,
         oracle.violations,
@@ -64,7 +64,7 @@ def is_known(outcome: str) -> bool:
     return outcome in ON_PURPOSE | REASONS or (kind is not None and issubclass(kind, errors.DcmpError))
 
 
-@pytest.mark.parametrize("first", range(0, SEEDS, 10))
+@pytest.mark.parametrize("first", range(0, SEED_COUNT, 10))
 def test_no_mixture_of_faults_breaks_a_rule(first: int) -> None:
     for seed in range(first, first + 10):
         outcome, violations, faults = mixed(seed)

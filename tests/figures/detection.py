@@ -18,7 +18,7 @@ from tests.helpers import T, bench
 if TYPE_CHECKING:
     from tests.helpers import FaultySim
 
-ENGAGED = 0.25  # s, when the trajectory starts
+ENGAGED_AT_S = 0.25  # s, when the trajectory starts
 
 
 class Detection(NamedTuple):
@@ -36,7 +36,7 @@ class Detection(NamedTuple):
 
 def first_motion(t: float) -> float:
     """Return when |x_r'| = |cos((t - 0.25)/2)|/2 first exceeds 0.1 rad/s, from `t` on, s."""
-    while abs(0.5 * math.cos(0.5 * (t - ENGAGED))) <= 0.1:
+    while abs(0.5 * math.cos(0.5 * (t - ENGAGED_AT_S))) <= 0.1:
         t += T
     return t
 

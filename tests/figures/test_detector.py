@@ -12,7 +12,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.safety.monitors import DisturbanceWatch
 from dcmp_hil.values import Estimate, Sample
 from tests import helpers
-from tests.figures.detection import ENGAGED, detect
+from tests.figures.detection import ENGAGED_AT_S, detect
 from tests.helpers import STEADY, FaultySim, T, bench, setting
 
 pytestmark = pytest.mark.usefixtures("untraced")
@@ -42,7 +42,7 @@ def test_reversal_is_found_in_time_while_the_arm_moves() -> None:
 @pytest.mark.parametrize(
     ("start", "live_from"),
     [
-        ("supervisor.start=engage", ENGAGED),
+        ("supervisor.start=engage", ENGAGED_AT_S),
         ("supervisor.start=immediate", 0.0),
     ],
 )

@@ -14,7 +14,7 @@ from tools.fuzz.build import CORE, Edit, Workshop, core_files
 from tools.fuzz.campaign import Campaign, Counts, Outcome
 from tools.fuzz.seeded import ERRORS
 
-EXECUTIONS = 50_000
+EXECUTION_COUNT = 50_000
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +28,8 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
 
 
 def test_every_seeded_error_is_found_and_the_core_has_none(workshop: Workshop, tmp_path: Path) -> None:
-    clean = campaign.run(workshop.program("clean"), tmp_path, runs=EXECUTIONS)
-    assert complaints(clean, EXECUTIONS, None) == [], clean.outcomes[0].wrong
+    clean = campaign.run(workshop.program("clean"), tmp_path, runs=EXECUTION_COUNT)
+    assert complaints(clean, EXECUTION_COUNT, None) == [], clean.outcomes[0].wrong
     assert len(ERRORS) >= 7
     lived = []
     for name, seeded in ERRORS.items():

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pytest
 
 _MAIN = "from dcmp_hil.cli import main\nmain()"
-BOUND = 60.0  # s: generous, these machines are shared
+TIMEOUT_S = 60.0  # s: generous, these machines are shared
 
 
 @contextmanager
@@ -53,10 +53,10 @@ def started(folder: Path, *arguments: str, first: int = 9876) -> Iterator[subpro
     finally:
         if process.poll() is None:
             process.kill()
-        process.communicate(timeout=BOUND)
+        process.communicate(timeout=TIMEOUT_S)
 
 
-def until(done: Callable[[], object], what: str, within: float = BOUND) -> None:
+def until(done: Callable[[], object], what: str, within: float = TIMEOUT_S) -> None:
     """Wait until something is true."""
     deadline = time.monotonic() + within
     while not done():

@@ -21,7 +21,7 @@ from tests.helpers import bench, cycle
 if TYPE_CHECKING:
     from pathlib import Path
 
-_ROWS = 16
+_RING_ROWS = 16
 
 
 class _Rig:
@@ -30,7 +30,7 @@ class _Rig:
     def __init__(self) -> None:
         files = [reserve(self, "mailbox"), reserve(self, "ring")]
         self.mailbox = Mailbox(mapped(files[0], MAILBOX_BYTES))
-        self.ring = Ring(_ROWS, mapped(files[1], size_of(_ROWS)))
+        self.ring = Ring(_RING_ROWS, mapped(files[1], size_of(_RING_ROWS)))
         setup = command_server.CommandSetup(bench(), files[0], files[1])
         self.server = command_server.Server(setup, Mailbox(mapped(files[0], MAILBOX_BYTES)), os.getpid())
         self.answer: int | None = APPLIED

@@ -16,7 +16,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, run_sockets
 from dcmp_hil.live.stop_command import End
-from tests.live.processes import BOUND, command_process_of, started, until, until_running
+from tests.live.processes import TIMEOUT_S, command_process_of, started, until, until_running
 
 pytestmark = pytest.mark.usefixtures("own_run_folder")
 
@@ -57,7 +57,7 @@ def test_run_is_changed_and_stopped_from_outside(tmp_path: Path) -> None:
         assert stopped.said.endswith("Amplifier at 0 V.")
         with suppress(ConfigError):  # it may have left already
             client.stop(run.pid)  # a second one changes nothing
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
     assert figures["ended_by"] == "STOP"
@@ -73,7 +73,7 @@ def test_run_is_stopped_when_the_command_process_is_frozen(tmp_path: Path) -> No
         os.kill(commands, signal.SIGSTOP)
         try:
             client.stop(run.pid)
-            run.wait(timeout=BOUND)
+            run.wait(timeout=TIMEOUT_S)
         finally:
             with suppress(ProcessLookupError):
                 os.kill(commands, signal.SIGCONT)
@@ -88,7 +88,7 @@ def test_run_goes_on_and_warns_when_the_command_process_is_killed(tmp_path: Path
         until(lambda: not run_sockets.running(), "its socket was cleaned up")
         assert run.poll() is None
         run.send_signal(signal.SIGINT)
-        _, err = run.communicate(timeout=BOUND)
+        _, err = run.communicate(timeout=TIMEOUT_S)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
     assert err.count("The command process ended") == 1
@@ -100,7 +100,7 @@ def test_command_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
         until_running(run)
         commands = command_process_of(run.pid)
         run.kill()
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
         until(lambda: _gone(commands), "the command process left", within=1.0)
     assert run_sockets.running() == []
 
@@ -111,7 +111,7 @@ def test_run_says_why_it_does_not_listen_when_its_folder_is_not_its_own(tmp_path
         assert run.stderr is not None
         said = run.stderr.readline()
         run.send_signal(signal.SIGINT)
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
     assert run.returncode == 0
     assert "The command process ended" in said
     assert "is no folder of yours alone" in said
@@ -119,7 +119,7 @@ def test_run_says_why_it_does_not_listen_when_its_folder_is_not_its_own(tmp_path
 
 def test_run_does_not_listen_when_that_is_wanted(tmp_path: Path) -> None:
     with started(tmp_path, *_RUN[:-4], "--duration", "0.5", "--no-control") as run:
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
     assert run.returncode == 0
     assert not any(run_sockets.folder().iterdir())
 
@@ -130,7 +130,7 @@ def test_commands_say_so_when_there_is_no_run() -> None:
             [sys.executable, "-c", "from dcmp_hil.cli import main; main()", *arguments],
             capture_output=True,
             text=True,
-            timeout=BOUND,
+            timeout=TIMEOUT_S,
             check=False,
         )
         assert done.returncode == 2

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 T = 0.002  # s
-COUNTS = 4096
-DEG = math.degrees(1.0)
-EPOCH = 1_767_225_600
-TOLERANCE = 1e-4  # rad/s
+COUNTS_PER_REV = 4096
+DEG_PER_RAD = math.degrees(1.0)
+EPOCH_S = 1_767_225_600
+TOLERANCE_RAD_S = 1e-4  # rad/s
 HEADER = "time_s,position_rad,voltage_V"
 
 Content = bytes | str | Sequence[str]
@@ -28,13 +28,13 @@ Content = bytes | str | Sequence[str]
 
 @cache
 def motion() -> Truth:
-    return swing(ticks=20, duration=3.0, counts=COUNTS)
+    return swing(ticks=20, duration=3.0, counts=COUNTS_PER_REV)
 
 
 @cache
 def figure() -> float:
     truth = motion()
-    settings = ReplaySettings(ku=5.4, counts_per_rev=COUNTS)
+    settings = ReplaySettings(ku=5.4, counts_per_rev=COUNTS_PER_REV)
     return replay(truth.recording(), settings).figures.velocity_error_rms_rad_s
 
 
@@ -128,8 +128,8 @@ def check(case: Case, folder: Path) -> None:
     path = folder / "rec.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     recording = read_recording(path, ColumnOptions(**case.options))  # type: ignore[arg-type]
-    result = replay(recording, ReplaySettings(ku=5.4, counts_per_rev=COUNTS))
-    near = TOLERANCE if expect.near is None else expect.near
+    result = replay(recording, ReplaySettings(ku=5.4, counts_per_rev=COUNTS_PER_REV))
+    near = TOLERANCE_RAD_S if expect.near is None else expect.near
     assert result.figures.velocity_error_rms_rad_s == pytest.approx(figure(), abs=near)
     rows = len(motion().time)
     assert result.figures.rows_left_out == (

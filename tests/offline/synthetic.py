@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-TICK = 1e-4  # s
-INERTIA = 0.16  # kg m2
+TICK_S = 1e-4  # s
+INERTIA_KG_M2 = 0.16  # kg m2
 MODEL = Model()
 
 
@@ -63,11 +63,11 @@ def swing(
         V: standard deviation of what is added to the voltage, new in every row.
     """
     random = np.random.default_rng(seed)
-    plant = MoreauPlant(MODEL, MODEL, position=0.3, step=TICK, steps=1)
+    plant = MoreauPlant(MODEL, MODEL, position=0.3, step=TICK_S, steps=1)
     rows: list[tuple[float, float, float, float]] = []
     now, position, velocity = 0, 0.3, 0.0
-    while now * TICK < duration:
-        t = now * TICK
+    while now * TICK_S < duration:
+        t = now * TICK_S
         voltage = 1.5 * math.sin(2.0 * t) + 1.5 * math.sin(9.0 * t) + kicks * random.standard_normal()
         rows.append((t, position, voltage, velocity))
         step = ticks + int(random.integers(-jitter, jitter + 1))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.offline.logged import (
-    DEG,
-    EPOCH,
+    DEG_PER_RAD,
+    EPOCH_S,
     HEADER,
     Cases,
     Expect,
@@ -33,7 +33,9 @@ case(
     lambda: [
         "time,position,voltage",
         "ms,deg,mV",
-        *columns(lambda t: f"{1e3 * t:.3f}", lambda q: f"{DEG * q:.6f}", lambda u: f"{1e3 * u:.3f}").lines(),
+        *columns(
+            lambda t: f"{1e3 * t:.3f}", lambda q: f"{DEG_PER_RAD * q:.6f}", lambda u: f"{1e3 * u:.3f}"
+        ).lines(),
     ],
 )
 case(
@@ -42,7 +44,7 @@ case(
         "Time,Angle,Voltage",
         "(ms),(deg),(V)",
         "",
-        *columns(lambda t: f"{1e3 * t:.6f}", lambda q: f"{DEG * q:.8f}").lines(),
+        *columns(lambda t: f"{1e3 * t:.6f}", lambda q: f"{DEG_PER_RAD * q:.8f}").lines(),
     ],
 )
 case(
@@ -119,7 +121,7 @@ case(
     "PlotJuggler",
     lambda: [
         "__time,/joint_states/pendulum/position,/joint_states/pendulum/velocity,/cmd/voltage",
-        *(f"{EPOCH + float(t):.6f},{q},0.0,{u}" for t, q, u in zip(*columns(), strict=True)),
+        *(f"{EPOCH_S + float(t):.6f},{q},0.0,{u}" for t, q, u in zip(*columns(), strict=True)),
     ],
     expect=Expect(near=1e-3),
 )
@@ -241,7 +243,7 @@ case(
     lambda: [
         "rosbagTimestamp,header,seq,stamp,secs,nsecs,frame_id,name,position,velocity,effort",
         *(
-            f"{(EPOCH * 500 + k) * 2000000},,{k},,{EPOCH + k // 500},{k % 500 * 2000000},'',"
+            f"{(EPOCH_S * 500 + k) * 2000000},,{k},,{EPOCH_S + k // 500},{k % 500 * 2000000},'',"
             f"['j'],[{q}],[0],[{u}]"
             for k, (q, u) in enumerate(zip(columns().q, columns().u, strict=True))
         ),

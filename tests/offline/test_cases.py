@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Script = Callable[..., Finished]
 
 CASES = Path(__file__).resolve().parents[2].parent / "shared" / "cases"
-CONTROL = 0.06186  # rad/s
+CONTROL_RMS_RAD_S = 0.06186  # rad/s
 
 needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="the recordings are not at ../shared/cases")
 
@@ -27,7 +27,7 @@ class Right(NamedTuple):
     """True values of a case."""
 
     options: str = "--ku 5.4"
-    rms: float = CONTROL
+    rms: float = CONTROL_RMS_RAD_S
     near: float = 1e-4
     rows: int = 4000
     note: str = ""

@@ -10,7 +10,7 @@ import pytest
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, LoggedSignals, ReplaySettings, read_recording, replay
-from tests.offline.logged import COUNTS, HEADER, T, columns, figure, motion
+from tests.offline.logged import COUNTS_PER_REV, HEADER, T, columns, figure, motion
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,7 +132,7 @@ def test_a_position_set_anew_begins_a_stretch(tmp_path: Path) -> None:
             ]
         )
     )
-    result = replay(read_recording(path), ReplaySettings(ku=5.4, counts_per_rev=COUNTS))
+    result = replay(read_recording(path), ReplaySettings(ku=5.4, counts_per_rev=COUNTS_PER_REV))
     assert result.figures.restarts == 1
     assert result.figures.velocity_error_rms_rad_s == pytest.approx(figure(), abs=5e-3)
     assert "The position jumps in 1 place, the first time at row 802" in " ".join(result.notes)

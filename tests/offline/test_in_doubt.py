@@ -11,7 +11,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from dcmp_hil.offline.column_names import match
-from tests.offline.logged import COUNTS, DEG, HEADER, TOLERANCE, columns, figure, motion
+from tests.offline.logged import COUNTS_PER_REV, DEG_PER_RAD, HEADER, TOLERANCE_RAD_S, columns, figure, motion
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,25 +30,25 @@ def read(tmp_path: Path, content: str | bytes, **options: object) -> LoggedSigna
 
 
 def rms(recording: LoggedSignals) -> float:
-    settings = ReplaySettings(ku=5.4, counts_per_rev=COUNTS)
+    settings = ReplaySettings(ku=5.4, counts_per_rev=COUNTS_PER_REV)
     return replay(recording, settings).figures.velocity_error_rms_rad_s
 
 
 def degrees(head: str) -> str:
-    rows = columns(q=lambda q: f"{DEG * q:.8f}").lines(";", comma=True)
+    rows = columns(q=lambda q: f"{DEG_PER_RAD * q:.8f}").lines(";", comma=True)
     return "\n".join([head, *rows]) + "\n"
 
 
 @pytest.mark.parametrize("encoding", ["mac_roman", "cp850", "cp437", "cp1252", "utf-8", "utf-16"])
 def test_a_degree_sign_in_any_encoding_is_one(encoding: str, tmp_path: Path) -> None:
     recording = read(tmp_path, degrees("Zeit [s];Winkel [°];Spannung [V]").encode(encoding))
-    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE)
+    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE_RAD_S)
 
 
 @pytest.mark.parametrize("name", ["Winkel [º]", "Winkel/°", "Winkel [\ufffd]", "Winkel (°, meas)"])
 def test_a_sign_like_a_degree_is_one(name: str, tmp_path: Path) -> None:
     recording = read(tmp_path, degrees(f"Zeit [s];{name};Spannung [V]"))
-    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE)
+    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE_RAD_S)
 
 
 @pytest.mark.parametrize(
@@ -106,16 +106,16 @@ def test_per_cent_in_the_header_of_a_file_are_no_volts(tmp_path: Path) -> None:
 
 
 def test_degrees_without_a_unit_are_asked_for(tmp_path: Path) -> None:
-    content = "\n".join(["time,angle,voltage", *columns(q=lambda q: f"{DEG * q:.5f}").lines()]) + "\n"
+    content = "\n".join(["time,angle,voltage", *columns(q=lambda q: f"{DEG_PER_RAD * q:.5f}").lines()]) + "\n"
     with pytest.raises(ConfigError, match="--position-unit deg"):
         rms(read(tmp_path, content))
     recording = read(tmp_path, content, position_unit="deg")
-    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE)
+    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE_RAD_S)
 
 
 def test_radians_without_a_unit_are_not_asked_for(tmp_path: Path) -> None:
     recording = read(tmp_path, "\n".join(["time,angle,voltage", *columns().lines()]) + "\n")
-    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE)
+    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE_RAD_S)
 
 
 def torn(position: list[str], cut: int) -> str:
@@ -124,8 +124,8 @@ def torn(position: list[str], cut: int) -> str:
 
 
 def test_a_last_whole_number_that_breaks_off_is_left_out(tmp_path: Path) -> None:
-    counts = [str(round(q * COUNTS / math.tau) + 5000) for q in motion().position]
-    options = {"position_unit": "counts", "counts_per_rev": COUNTS}
+    counts = [str(round(q * COUNTS_PER_REV / math.tau) + 5000) for q in motion().position]
+    options = {"position_unit": "counts", "counts_per_rev": COUNTS_PER_REV}
     recording = read(tmp_path, torn(counts, 3), **options)
     assert len(recording.time) == len(counts) - 1
     assert "The last line is unfinished and left out." in recording.notes
@@ -142,9 +142,12 @@ def test_a_last_number_of_no_fixed_length_that_breaks_off_is_left_out(tmp_path: 
 
 
 def test_a_last_line_that_is_whole_is_kept_without_its_end(tmp_path: Path) -> None:
-    counts = [str(round(q * COUNTS / math.tau) + 5000) for q in motion().position]
+    counts = [str(round(q * COUNTS_PER_REV / math.tau) + 5000) for q in motion().position]
     recording = read(
-        tmp_path, torn([*counts[:-1], counts[-1] + "#"], 1), position_unit="counts", counts_per_rev=COUNTS
+        tmp_path,
+        torn([*counts[:-1], counts[-1] + "#"], 1),
+        position_unit="counts",
+        counts_per_rev=COUNTS_PER_REV,
     )
     assert len(recording.time) == len(counts)
 
@@ -162,9 +165,11 @@ def test_a_voltage_that_lost_its_point_is_left_out(tmp_path: Path) -> None:
 
 def test_names_above_those_of_the_sensors_are_found(tmp_path: Path) -> None:
     lines = ["time,position,voltage", "clocked by,AMT102,VNH5019", "ms,deg,mV"]
-    rows = columns(t=lambda t: f"{1e3 * t:.3f}", q=lambda q: f"{DEG * q:.8f}", u=lambda u: f"{1e3 * u:.3f}")
+    rows = columns(
+        t=lambda t: f"{1e3 * t:.3f}", q=lambda q: f"{DEG_PER_RAD * q:.8f}", u=lambda u: f"{1e3 * u:.3f}"
+    )
     recording = read(tmp_path, "\n".join([*lines, *rows.lines()]) + "\n")
-    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE)
+    assert rms(recording) == pytest.approx(figure(), abs=TOLERANCE_RAD_S)
 
 
 def test_stamps_in_whole_ms_of_a_period_near_3_ms_are_an_even_grid(tmp_path: Path) -> None:

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.offline.logged import COUNTS, DEG, HEADER, Cases, Expect, check, columns, motion, usual
+from tests.offline.logged import (
+    COUNTS_PER_REV,
+    DEG_PER_RAD,
+    HEADER,
+    Cases,
+    Expect,
+    check,
+    columns,
+    motion,
+    usual,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,7 +36,10 @@ case("LF and CRLF mixed", lambda: usual().replace("\n", "\r\n", 700).encode())
 case(
     "Excel, German, Windows-1252",
     lambda: "\r\n".join(
-        ["Zeit [s];Winkel [°];Spannung [V]", *columns(q=lambda q: f"{q * DEG:.6f}").lines(";", comma=True)]
+        [
+            "Zeit [s];Winkel [°];Spannung [V]",
+            *columns(q=lambda q: f"{q * DEG_PER_RAD:.6f}").lines(";", comma=True),
+        ]
     ).encode("cp1252"),
     expect=Expect(note="Windows-1252"),
 )
@@ -115,11 +128,11 @@ case(
     lambda: [
         "time_s,counts,voltage_V",
         *(
-            f"{t},0x{round(q * COUNTS / math.tau) % 65536:04X},{u}"
+            f"{t},0x{round(q * COUNTS_PER_REV / math.tau) % 65536:04X},{u}"
             for t, q, u in zip(columns().t, motion().position, columns().u, strict=True)
         ),
     ],
-    counts_per_rev=COUNTS,
+    counts_per_rev=COUNTS_PER_REV,
     modulus=65536.0,
 )
 

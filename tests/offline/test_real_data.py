@@ -9,14 +9,14 @@ import pytest
 from dcmp_hil.offline import Figures, ReplaySettings, read_recording, replay
 
 DATA = Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "dfki_pendulum"
-INERTIA = 0.16  # kg m2
+INERTIA_KG_M2 = 0.16  # kg m2
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured data is not at ../shared/data")
 
 
 def figures_of(name: str, **settings: object) -> Figures:
     recording = read_recording(DATA / name)
-    return replay(recording, ReplaySettings(inertia=INERTIA, **settings)).figures  # type: ignore[arg-type]
+    return replay(recording, ReplaySettings(inertia=INERTIA_KG_M2, **settings)).figures  # type: ignore[arg-type]
 
 
 def test_velocity_is_at_least_as_good_as_the_drives_own_on_the_swing_up() -> None:

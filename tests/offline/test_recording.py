@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
-from tests.offline.synthetic import INERTIA, MODEL, Truth, swing, write
+from tests.offline.synthetic import INERTIA_KG_M2, MODEL, Truth, swing, write
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def truth() -> Truth:
 
 
 def torque_of(truth: Truth) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return INERTIA * MODEL.ku * truth.voltage
+    return INERTIA_KG_M2 * MODEL.ku * truth.voltage
 
 
 UNITS = {
@@ -63,7 +63,7 @@ def test_units_give_the_same_recording(case: str, truth: Truth, tmp_path: Path) 
     got = (recording.time, recording.position, recording.input, recording.velocity)
     for expected, values in zip(columns, got, strict=True):
         assert values == pytest.approx(expected, rel=1e-9, abs=1e-9)
-    result = replay(recording, ReplaySettings(inertia=INERTIA)).figures
+    result = replay(recording, ReplaySettings(inertia=INERTIA_KG_M2)).figures
     same = replay(truth.recording(velocity=truth.velocity)).figures
     assert result.velocity_error_rms_rad_s == pytest.approx(same.velocity_error_rms_rad_s, rel=1e-6)
     assert result.disturbance_rms_rad_s2 == pytest.approx(same.disturbance_rms_rad_s2, rel=1e-6)

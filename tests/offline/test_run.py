@@ -10,7 +10,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ReplayResult, ReplaySettings, replay
 from dcmp_hil.values import Estimate, Sample
-from tests.offline.synthetic import INERTIA, MODEL, Truth, lose, swing
+from tests.offline.synthetic import INERTIA_KG_M2, MODEL, Truth, lose, swing
 
 
 def true_error(truth: Truth, result: ReplayResult) -> float:
@@ -97,11 +97,11 @@ def test_start_and_end_agree_when_the_column_is_shifted() -> None:
 
 def test_torque_acts_as_torque_over_inertia() -> None:
     truth = swing()
-    torque = truth.recording(input=INERTIA * MODEL.ku * truth.voltage, input_kind="torque")
+    torque = truth.recording(input=INERTIA_KG_M2 * MODEL.ku * truth.voltage, input_kind="torque")
     expected = replay(truth.recording()).estimates
-    estimates = replay(torque, ReplaySettings(inertia=INERTIA)).estimates
+    estimates = replay(torque, ReplaySettings(inertia=INERTIA_KG_M2)).estimates
     assert estimates.disturbance == pytest.approx(expected.disturbance, abs=1e-8)
-    heavier = replay(torque, ReplaySettings(inertia=2.0 * INERTIA)).estimates
+    heavier = replay(torque, ReplaySettings(inertia=2.0 * INERTIA_KG_M2)).estimates
     assert np.max(np.abs(heavier.disturbance - expected.disturbance)) > 1.0
 
 

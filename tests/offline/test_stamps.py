@@ -9,7 +9,7 @@ import pytest
 
 from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.offline.logged import (
-    EPOCH,
+    EPOCH_S,
     HEADER,
     Cases,
     Expect,
@@ -58,30 +58,30 @@ case(
     ],
 )
 case("American time", lambda: clocked(lambda t: "3/2/2026 " + iso(t)[11:] + " AM", "DateTime"))
-case("time in brackets", lambda: clocked(lambda t: f"({EPOCH + t:.6f})"), expect=Expect(near=1e-3))
+case("time in brackets", lambda: clocked(lambda t: f"({EPOCH_S + t:.6f})"), expect=Expect(near=1e-3))
 
 
 def epoch(a_second: int) -> list[str]:
-    return stamped(lambda k: f"{(EPOCH * 500 + k) * a_second // 500}", "timestamp")
+    return stamped(lambda k: f"{(EPOCH_S * 500 + k) * a_second // 500}", "timestamp")
 
 
-case("epoch in s", lambda: stamped(lambda k: f"{EPOCH + k * T:.6f}", "timestamp"), expect=Expect(near=1e-3))
+case("epoch in s", lambda: stamped(lambda k: f"{EPOCH_S + k * T:.6f}", "timestamp"), expect=Expect(near=1e-3))
 case("epoch in ms", lambda: epoch(10**3), expect=Expect(near=1e-3))
 case("epoch in us", lambda: epoch(10**6), expect=Expect(near=1e-3))
 case("epoch in ns", lambda: epoch(10**9), expect=Expect(near=1e-3))
 case(
     "ROS, %time in ns",
-    lambda: stamped(lambda k: str(EPOCH * 10**9 + k * 2 * 10**6), "%time"),
+    lambda: stamped(lambda k: str(EPOCH_S * 10**9 + k * 2 * 10**6), "%time"),
     expect=Expect(near=1e-3),
 )
 case(
     "secs and nsecs",
-    lambda: stamped(lambda k: f"{EPOCH + k // 500},{k % 500 * 2 * 10**6}", "stamp.secs,stamp.nsecs"),
+    lambda: stamped(lambda k: f"{EPOCH_S + k // 500},{k % 500 * 2 * 10**6}", "stamp.secs,stamp.nsecs"),
 )
-case("sec and usec", lambda: stamped(lambda k: f"{EPOCH + k // 500},{k % 500 * 2000}", "tv_sec,tv_usec"))
+case("sec and usec", lambda: stamped(lambda k: f"{EPOCH_S + k // 500},{k % 500 * 2000}", "tv_sec,tv_usec"))
 case(
     "sec and nanosec, by option",
-    lambda: stamped(lambda k: f"{EPOCH + k // 500},{k % 500 * 2 * 10**6}", "header_sec,header_nanosec"),
+    lambda: stamped(lambda k: f"{EPOCH_S + k // 500},{k % 500 * 2 * 10**6}", "header_sec,header_nanosec"),
     time="header_sec+header_nanosec",
 )
 case("the same time twice", lambda: stamped(lambda k: f"{k * T:.6f},{2 * k}", "time_s,time_ms"))
@@ -116,12 +116,12 @@ case(
 BACK = Expect(near=5e-3, restarts=1, note="goes back in 1 place, the first time by")
 case(
     "clock set back",
-    lambda: stamped(lambda k: f"{EPOCH + k * T - (0.25 if k > 700 else 0):.6f}", "time_s"),
+    lambda: stamped(lambda k: f"{EPOCH_S + k * T - (0.25 if k > 700 else 0):.6f}", "time_s"),
     expect=BACK,
 )
 case(
     "clock set back by an hour",
-    lambda: stamped(lambda k: f"{EPOCH + k * T - (3600 if k > 700 else 0):.6f}", "time_s"),
+    lambda: stamped(lambda k: f"{EPOCH_S + k * T - (3600 if k > 700 else 0):.6f}", "time_s"),
     expect=BACK,
 )
 case(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from tests.live.processes import BOUND, own_folder, started
+from tests.live.processes import TIMEOUT_S, own_folder, started
 from tests.panel.test_browser import address_of, free_port
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class _Page(NamedTuple):
     def ask(
         self, method: str, path: str, body: str | None = None, **headers: str
     ) -> tuple[int, str, http.client.HTTPMessage]:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=BOUND)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=TIMEOUT_S)
         try:
             given = {name.replace("_", "-"): value for name, value in headers.items()}
             connection.request(method, path, body, given)
@@ -94,7 +94,7 @@ def test_what_is_no_change_is_refused(page: _Page, body: str) -> None:
 
 def test_port_in_use_is_said(page: _Page, tmp_path_factory: pytest.TempPathFactory) -> None:
     with started(tmp_path_factory.mktemp("second"), "panel", "--port", str(page.port)) as second:
-        _, err = second.communicate(timeout=BOUND)
+        _, err = second.communicate(timeout=TIMEOUT_S)
     assert second.returncode == 2
     assert err.startswith(f"error: --port {page.port}: ")
     assert len(err.splitlines()) == 1
@@ -102,6 +102,6 @@ def test_port_in_use_is_said(page: _Page, tmp_path_factory: pytest.TempPathFacto
 
 def test_viewer_that_is_no_address_is_refused(tmp_path_factory: pytest.TempPathFactory) -> None:
     with started(tmp_path_factory.mktemp("third"), "panel", "--viewer", "javascript:alert(1)") as third:
-        _, err = third.communicate(timeout=BOUND)
+        _, err = third.communicate(timeout=TIMEOUT_S)
     assert third.returncode == 2
     assert "expected a URL" in err

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.live.processes import BOUND, command_process_of, own_folder, started, until, until_running
+from tests.live.processes import TIMEOUT_S, command_process_of, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def test_page_changes_a_run_shows_what_was_applied_and_stops_it(tmp_path: Path) 
         until(lambda: float(_text(page, "time").split()[0]) > 4.0, "a few seconds to look at")
         _keep_picture(page, "panel.png")
         _by(page, "stop").click()
-        run.communicate(timeout=BOUND)
+        run.communicate(timeout=TIMEOUT_S)
         until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
         until(lambda: "Amplifier at 0 V." in _text(page, "banner"), "the page said how")
         assert _text(page, "voltage") == "0.00"
@@ -134,7 +134,7 @@ def test_page_finds_the_next_run_and_escape_stops_it(tmp_path: Path) -> None:
                 until(lambda: _text(page, "phase") == "running", "the page heard of the run again")
                 until(lambda: _text(page, "voltage") != _NOT_KNOWN, "the voltage came back")
                 page.find_element("tag name", "body").send_keys("\ue00c")  # Escape
-                run.communicate(timeout=BOUND)
+                run.communicate(timeout=TIMEOUT_S)
                 assert run.returncode == 0
             until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
 

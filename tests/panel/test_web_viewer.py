@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 _REPORTS = Path("reports")
-_FIRST = 22_000  # of the ports; no other test serves there
+_FIRST_PORT = 22_000  # of the ports; no other test serves there
 _RUN = ("run", "bench-1khz", "--viewer", "serve", "--no-record", "--duration", "0")
 
 
@@ -43,12 +43,12 @@ def _coloured(page: Chrome, colour: tuple[int, int, int]) -> int:
 
 def test_the_dashboard_is_drawn_in_the_panel(tmp_path: Path) -> None:
     with (
-        started(tmp_path, *_RUN, first=_FIRST) as run,
+        started(tmp_path, *_RUN, first=_FIRST_PORT) as run,
         browser(tmp_path / "chromium", draws=True) as page,
     ):
         until_running(run)
-        until(lambda: window.served(_FIRST), "the run was served")
-        with started(tmp_path, "panel", "--web", "--port", str(free_port()), first=_FIRST) as panel:
+        until(lambda: window.served(_FIRST_PORT), "the run was served")
+        with started(tmp_path, "panel", "--web", "--port", str(free_port()), first=_FIRST_PORT) as panel:
             page.get(address_of(panel))
             until(lambda: _coloured(page, VOLTAGE_RGB) > 50, "the voltage was drawn")
             until(lambda: _coloured(page, ERROR_RGB) > 50, "the tracking error was drawn")

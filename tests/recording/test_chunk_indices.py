@@ -10,7 +10,7 @@ from mcap.records import ChunkIndex
 from dcmp_hil.recording.chunk_indices import ChunkIndices
 
 ENDS = (1, 511, 512, 513, 1024, 1500)  # on both sides of where a block is full
-LARGEST = 2**63
+NUMBER_LIMIT = 2**63
 
 
 def index(k: int, offsets: dict[int, int]) -> ChunkIndex:
@@ -55,21 +55,21 @@ def of_a_run(n: int) -> list[ChunkIndex]:
 
 def any_index(chance: random.Random) -> ChunkIndex:
     """Return an index whose numbers have nothing to do with one another."""
-    start = chance.randrange(LARGEST)
+    start = chance.randrange(NUMBER_LIMIT)
     return ChunkIndex(
-        chunk_length=chance.randrange(LARGEST),
+        chunk_length=chance.randrange(NUMBER_LIMIT),
         chunk_start_offset=start,
         compression="zstd",
-        compressed_size=chance.randrange(LARGEST),
-        message_end_time=chance.randrange(LARGEST),
-        message_index_length=chance.randrange(LARGEST),
+        compressed_size=chance.randrange(NUMBER_LIMIT),
+        message_end_time=chance.randrange(NUMBER_LIMIT),
+        message_index_length=chance.randrange(NUMBER_LIMIT),
         message_index_offsets={
-            channel: chance.choice((start - 1, start + 1, chance.randrange(LARGEST)))
+            channel: chance.choice((start - 1, start + 1, chance.randrange(NUMBER_LIMIT)))
             for channel in (1, 2)
             if chance.random() < 0.7
         },
-        message_start_time=chance.randrange(LARGEST),
-        uncompressed_size=chance.randrange(LARGEST),
+        message_start_time=chance.randrange(NUMBER_LIMIT),
+        uncompressed_size=chance.randrange(NUMBER_LIMIT),
     )
 
 

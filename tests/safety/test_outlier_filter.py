@@ -11,13 +11,13 @@ from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T
 
-COUNT = math.tau / 4096
-SPEED = 20.0  # rad/s: four times that is 0.08 rad a period
+COUNT_RAD = math.tau / 4096
+SPEED_RAD_S = 20.0  # rad/s: four times that is 0.08 rad a period
 
 
 class _Bench:
-    def __init__(self, speed: float = SPEED) -> None:
-        self.outliers = OutlierFilter(speed, T, COUNT)
+    def __init__(self, speed: float = SPEED_RAD_S) -> None:
+        self.outliers = OutlierFilter(speed, T, COUNT_RAD)
 
     @property
     def stop(self) -> TripRequest | None:
@@ -52,7 +52,7 @@ def test_outliers_allow_for_lost_samples() -> None:
 
 def test_outliers_know_how_coarse_the_encoder_is() -> None:
     bench = _Bench(speed=1.0)  # 4 mrad a period, less than three counts
-    assert bench.rejected(0.0, 7.9 * COUNT, 0.0, 8.1 * COUNT) == [False, False, False, True]
+    assert bench.rejected(0.0, 7.9 * COUNT_RAD, 0.0, 8.1 * COUNT_RAD) == [False, False, False, True]
 
 
 def test_third_outlier_within_a_hundred_samples_ends_the_run() -> None:

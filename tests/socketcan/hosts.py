@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from pathlib import Path
 
-BOUND_S = 20.0
+TIMEOUT_S = 20.0
 
 
 class Host:
@@ -41,7 +41,7 @@ class Host:
 
     def wait(self) -> int | None:
         """Return the exit code; None if it did not end in time."""
-        self._process.join(BOUND_S)
+        self._process.join(TIMEOUT_S)
         return self._process.exitcode
 
     def printed(self) -> str:

@@ -24,7 +24,7 @@ _OPEN = b"C\rS8\rO\r"  # what slcand says
 _FRAME = struct.Struct("=IB3x8s")
 ERROR = 0x2000_0000  # flag of an error frame; below it the classes of error
 BUS_OFF = 0x40
-_CHUNK = 4096
+_CHUNK_BYTES_MAX = 4096
 
 
 def ip(*words: str) -> None:
@@ -116,7 +116,7 @@ class Bridge:
                     self._to_device()
 
     def _to_bus(self) -> None:
-        for received in self._receiver.feed(os.read(self._line, _CHUNK)):
+        for received in self._receiver.feed(os.read(self._line, _CHUNK_BYTES_MAX)):
             self._raw.send(frame(*received))
 
     def _to_device(self) -> None:

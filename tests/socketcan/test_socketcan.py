@@ -20,7 +20,7 @@ from tools.hosts import wait
 if TYPE_CHECKING:
     from pathlib import Path
 
-BACKEND = 3  # exit code
+BACKEND_EXIT_CODE = 3  # exit code
 OFF_MS = WATCHDOG_MS + 5.0  # and a period
 CLASSES = [1 << bit for bit in range(10) if 1 << bit != BUS_OFF]
 TOLD = [b"sw096000\r", b"sp128000\r", b"e1a\r", b"e3bcs\r", b"e2oO\r", b"sa000000\r"]
@@ -48,7 +48,7 @@ def test_run_ends_with_its_exit_code_when_the_bus_goes_off(tmp_path: Path) -> No
         host = bench.drive()
         bench.since_us, _ = bench.device.clock_us()
         other.send(frame(ERROR | BUS_OFF))
-        assert host.wait() == BACKEND
+        assert host.wait() == BACKEND_EXIT_CODE
         assert bench.off_after_ms() <= OFF_MS
     assert "vcan0: bus-off. The device goes to 0 V by itself. Check termination" in host.printed()
     assert "ip link set vcan0 down, then up" in host.printed()

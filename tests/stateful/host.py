@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from dcmp_hil.device.backend import DeviceBackend
     from tests.stateful.judge import Judge
 
-SETTLE, ENGAGE, STOP = 0.005, 0.01, 0.05  # s
-MOST = 10.0  # V
-PERIOD = 1e-3  # s
+SETTLE_TIME_S, ENGAGE_TIME_S, STOP_TIME_S = 0.005, 0.01, 0.05  # s
+VOLTAGE_MAX_V = 10.0  # V
+PERIOD_S = 1e-3  # s
 _ORDER = list(Phase)  # a run goes down this list, and never up
 _POWERLESS = {Phase.ARMING, Phase.SETTLING, Phase.TRIPPED}
 
@@ -37,9 +37,11 @@ class Host:
     def __init__(self, backend: DeviceBackend, judge: Judge, session: int) -> None:
         self.backend, self.judge, self.session = backend, judge, session
         self.objector = Objector()
-        limiter = Limiter(voltage=MOST, period=PERIOD, notify=self._notified)
+        limiter = Limiter(voltage=VOLTAGE_MAX_V, period=PERIOD_S, notify=self._notified)
         monitors = (FiniteMonitor(), self.objector)
-        self.supervisor = Supervisor(monitors, limiter, settle=SETTLE, engage=ENGAGE, notify=self._notified)
+        self.supervisor = Supervisor(
+            monitors, limiter, settle=SETTLE_TIME_S, engage=ENGAGE_TIME_S, notify=self._notified
+        )
         self.sample = Sample(-math.inf, 0.0, 0.0)
         self._phase, self._since = Phase.ARMING, 0.0
 
@@ -84,7 +86,7 @@ class Host:
         phase, gone = self.supervisor.phase, self.sample.t - self._since
         if not abs(voltage) <= self._most(phase, gone):
             self.judge.note(f"{voltage} V in {phase}, {gone} s after it began")
-        if phase is Phase.STOPPING and gone > STOP + 1e-9:
+        if phase is Phase.STOPPING and gone > STOP_TIME_S + 1e-9:
             self.judge.note(f"{phase} for {gone} s")
         ended = self.sample.fault != Fault.NONE or self.objector.objects or not math.isfinite(demand)
         if ended and (phase is not Phase.TRIPPED or voltage != 0.0):
@@ -94,8 +96,12 @@ class Host:
         if phase in _POWERLESS:
             return 0.0
         if phase is Phase.ENGAGING:
-            return MOST * gone / ENGAGE + 1e-9
-        return MOST * max(0.0, 1.0 - gone / STOP) + 1e-9 if phase is Phase.STOPPING else MOST
+            return VOLTAGE_MAX_V * gone / ENGAGE_TIME_S + 1e-9
+        return (
+            VOLTAGE_MAX_V * max(0.0, 1.0 - gone / STOP_TIME_S) + 1e-9
+            if phase is Phase.STOPPING
+            else VOLTAGE_MAX_V
+        )
 
     def _notified(self, event: Event) -> None:
         if not isinstance(event.data, PhaseData):

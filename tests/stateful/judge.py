@@ -10,7 +10,7 @@ from tests.faults.oracle import Oracle
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_REMEMBERED = 64  # pieces that reached the board, to be sent again
+_REMEMBERED_PIECES_MAX = 64  # pieces that reached the board, to be sent again
 
 
 class Judge(Oracle):
@@ -33,7 +33,7 @@ class Judge(Oracle):
 
     def heard(self, piece: bytes) -> None:
         super().heard(piece)
-        self.heard_pieces = [*self.heard_pieces[1 - _REMEMBERED :], piece]
+        self.heard_pieces = [*self.heard_pieces[1 - _REMEMBERED_PIECES_MAX :], piece]
 
     def said(self, piece: bytes) -> None:
         super().said(piece)

@@ -13,7 +13,7 @@ from dcmp_hil.wire.messages import Drive, Hello, Parameter, ParameterSet
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tests.stateful.system import FAULTS, Start, System
 
-VOLTS = st.one_of(
+VOLTAGES_V = st.one_of(
     st.floats(-3.0, 3.0),
     st.sampled_from([0.0, 10.0, -10.0, 40.0, 1e300, math.inf, -math.inf, math.nan]),
 )
@@ -23,9 +23,9 @@ STARTS = st.builds(
     st.sampled_from([0, 200, 8100, 2**31 - 100, 2**32 - 300]),
     st.sampled_from([0, 2**15 - 3, 2**23 - 400, 2**24 - 3, -(2**31) + 2]),
 )
-SILENCES = st.sampled_from([1, 2, 3, 9, 10, 18, 19, 20, 21, 22, 25, 40])
-FIRST = st.sampled_from([0, 20])  # periods: after 20 a run has full authority
-STRANGER = 0xBEEF
+SILENCE_PERIODS = st.sampled_from([1, 2, 3, 9, 10, 18, 19, 20, 21, 22, 25, 40])
+FIRST_PERIODS = st.sampled_from([0, 20])  # periods: after 20 a run has full authority
+OTHER_SESSION = 0xBEEF
 
 
 class Machine(RuleBasedStateMachine):
@@ -38,12 +38,12 @@ class Machine(RuleBasedStateMachine):
         super().__init__()
         self.system = System()
 
-    @initialize(seed=st.integers(0, 1000), start=STARTS, periods=FIRST)
+    @initialize(seed=st.integers(0, 1000), start=STARTS, periods=FIRST_PERIODS)
     def boot(self, seed: int, start: Start, periods: int) -> None:
         self.system = System(seed, start)
         self.open(periods)
 
-    @rule(periods=st.integers(1, 4), volts=VOLTS)
+    @rule(periods=st.integers(1, 4), volts=VOLTAGES_V)
     def run(self, periods: int, volts: float) -> None:
         for _ in range(periods):
             self.system.period(volts)
@@ -54,7 +54,7 @@ class Machine(RuleBasedStateMachine):
         for _ in range(periods):
             self.system.period(volts)
 
-    @rule(ticks=SILENCES)
+    @rule(ticks=SILENCE_PERIODS)
     def host_is_silent(self, ticks: int) -> None:
         self.system.alone(ticks)
 
@@ -62,13 +62,13 @@ class Machine(RuleBasedStateMachine):
     def fault(self, kind: str, ticks: int) -> None:
         self.system.inject_fault(kind, ticks)
 
-    @rule(session=st.sampled_from([0, STRANGER]), wrong=st.booleans())
+    @rule(session=st.sampled_from([0, OTHER_SESSION]), wrong=st.booleans())
     def stranger_says_hello(self, session: int, wrong: bool) -> None:
         self.system.say(Hello(session, PROTOCOL_HASH ^ wrong))
 
     @rule(mV=st.integers(-32768, 32767), age=st.integers(-3, 12), arm=st.booleans(), own=st.booleans())
     def another_host_drives(self, mV: int, age: int, arm: bool, own: bool) -> None:  # noqa: N803
-        session = self.system.board.owner if own else STRANGER
+        session = self.system.board.owner if own else OTHER_SESSION
         self.system.alone(1)
         self.system.say(Drive(mV, self.system.seq(age), arm, False, False, session, 20))
 
@@ -82,14 +82,14 @@ class Machine(RuleBasedStateMachine):
 
     @rule(mV=st.sampled_from([0, 0, 1]), clear=st.booleans(), own=st.booleans())
     def another_host_clears(self, mV: int, clear: bool, own: bool) -> None:  # noqa: N803
-        session = self.system.board.owner if own else STRANGER
+        session = self.system.board.owner if own else OTHER_SESSION
         self.system.alone(1)
         self.system.say(Drive(mV, self.system.seq(), False, clear, False, session, 20))
 
     @rule(periods=st.integers(1, 11))
     def stranger_arms(self, periods: int) -> None:
         for _ in range(periods):
-            self.system.say(Drive(0, self.system.seq(), True, False, False, STRANGER, 20))
+            self.system.say(Drive(0, self.system.seq(), True, False, False, OTHER_SESSION, 20))
             self.system.period()
 
     @rule(reason=st.integers(0, 255))
@@ -102,7 +102,7 @@ class Machine(RuleBasedStateMachine):
         own=st.booleans(),
     )
     def set_what_may_not_be(self, parameter: int, value: int, own: bool) -> None:
-        self.system.say(ParameterSet(self.system.board.owner if own else STRANGER, parameter, value))
+        self.system.say(ParameterSet(self.system.board.owner if own else OTHER_SESSION, parameter, value))
 
     @rule(watchdog=st.integers(5, 50))
     def lower_watchdog(self, watchdog: int) -> None:
@@ -123,7 +123,7 @@ class Machine(RuleBasedStateMachine):
         self.system.reset()
 
     @precondition(lambda self: self.system.host is not None)
-    @rule(volts=VOLTS)
+    @rule(volts=VOLTAGES_V)
     def careless_write(self, volts: float) -> None:
         """A write past the supervisor cannot get a number that is none onto the wire."""
         assert self.system.host is not None
@@ -157,7 +157,7 @@ class Machine(RuleBasedStateMachine):
         self.system.close()
 
     @precondition(lambda self: self.system.host is None)
-    @rule(periods=FIRST)
+    @rule(periods=FIRST_PERIODS)
     def open(self, periods: int) -> None:
         if self.system.open():
             for _ in range(periods):

@@ -11,18 +11,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 SMALL = Rules(arming=2, oldest=1, watchdog=2)
-OURS, THEIRS = 1, 2  # sessions
+OUR_SESSION, OTHER_SESSION = 1, 2  # sessions
 OFF, CLEARING, CLEARED, ARMING, BYE = "off", "clearing", "cleared", "arming the device", "bye"
 _POWERED = (Phase.PROBING, Phase.ENGAGING, Phase.RUNNING, Phase.STOPPING)
 _ENDS = (Phase.STOPPING, Phase.TRIPPED)
 _DEPTH = 2  # commands on the line
 _STRANGE = [
-    Command(THEIRS),
-    Command(THEIRS, volts=True),
-    Command(THEIRS, flag=""),
-    Command(THEIRS, flag="clear"),
+    Command(OTHER_SESSION),
+    Command(OTHER_SESSION, volts=True),
+    Command(OTHER_SESSION, flag=""),
+    Command(OTHER_SESSION, flag="clear"),
 ]
-_HEALTHY = 60  # periods
+_HEALTHY_PERIODS = 60  # periods
 
 
 class Pair(NamedTuple):
@@ -93,8 +93,8 @@ class Model:
 
     def _host(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
         if pair.host == OFF:
-            device = self.rules.hello(pair.device, OURS)
-            if device.owner == OURS:
+            device = self.rules.hello(pair.device, OUR_SESSION)
+            if device.owner == OUR_SESSION:
                 yield "start", pair._replace(device=device, host=CLEARING, line=(), told=None)
             return
         yield "the host dies", pair._replace(host=OFF)
@@ -106,19 +106,27 @@ class Model:
     def answers(self, host: str, told: State) -> Iterator[tuple[str, Command]]:
         """Return what a host may do about a SAMPLE: where it is then, and what it says."""
         if host == CLEARING:
-            yield (CLEARED, Command(OURS, flag="")) if told == State.FAULT else (ARMING, Command(OURS))
+            yield (
+                (CLEARED, Command(OUR_SESSION, flag=""))
+                if told == State.FAULT
+                else (ARMING, Command(OUR_SESSION))
+            )
         elif host == CLEARED:
-            yield (ARMING, Command(OURS)) if told == State.IDLE else (CLEARED, Command(OURS, flag="clear"))
+            yield (
+                (ARMING, Command(OUR_SESSION))
+                if told == State.IDLE
+                else (CLEARED, Command(OUR_SESSION, flag="clear"))
+            )
         elif host == ARMING:
-            yield (Phase.ARMING if told == State.RUN else ARMING), Command(OURS)
+            yield (Phase.ARMING if told == State.RUN else ARMING), Command(OUR_SESSION)
         elif host == BYE:
-            yield OFF, Command(OURS, flag="release")
+            yield OFF, Command(OUR_SESSION, flag="release")
         else:
             yield from self._supervised(Phase(host), told)
 
     def _supervised(self, phase: Phase, told: State) -> Iterator[tuple[str, Command]]:
         if phase is Phase.TRIPPED:
-            yield BYE, Command(OURS, flag="")
+            yield BYE, Command(OUR_SESSION, flag="")
         events = self.table[phase]
         if told != State.RUN and not self._deaf and PhaseEvent.FAULT in events:
             phases = [events[PhaseEvent.FAULT]]
@@ -126,7 +134,7 @@ class Model:
             phases = [phase, *dict.fromkeys(events.values())]
         for following in phases:
             for volts in (False, True) if following in _POWERED else (False,):
-                yield following, Command(OURS, volts=volts)
+                yield following, Command(OUR_SESSION, volts=volts)
 
     def _others(self, pair: Pair) -> Iterator[tuple[str, Pair]]:
         rules, device = self.rules, pair.device
@@ -136,7 +144,7 @@ class Model:
             ("unplugged", rules.link(device, up=False)),
             ("plugged in", rules.link(device, up=True)),
             ("lapse", rules.lapse(device)),
-            ("their HELLO", rules.hello(device, THEIRS)),
+            ("their HELLO", rules.hello(device, OTHER_SESSION)),
         ):
             yield name, pair._replace(device=after)
         yield "reset", pair._replace(device=rules.boot())
@@ -236,8 +244,8 @@ def _reaches(model: Model, device: Device) -> bool:
     rules = model.rules
     for _ in range(rules.watchdog + 2):  # the host before is silent, and its session lapses
         device = rules.tick(device)
-    device, host = rules.hello(rules.lapse(device), OURS), CLEARING
-    for _ in range(_HEALTHY):
+    device, host = rules.hello(rules.lapse(device), OUR_SESSION), CLEARING
+    for _ in range(_HEALTHY_PERIODS):
         device = rules.tick(device)
         answers = [answer for answer in model.answers(host, device.state) if answer[0] not in _ENDS]
         if not answers:

@@ -49,12 +49,13 @@ FAULTS = {
 """The faults that can be injected, by kind."""
 
 _TICKING = ("wire.unplug",)  # they do something in every tick
-_SEQ = 0x1FFF
-_LEASE, _QUIET = 600, 60  # ticks: a session lapses; nothing of an earlier fault is on its way any more
-_REST, _PATIENCE = 50, 400
-_AGAIN = 60  # periods in which a healthy start must have full authority
-_NEAR = 3.0  # rad
-_ENCODER = 2.0 * math.tau / 4096  # rad
+_SEQUENCE_MASK = 0x1FFF
+_LEASE_TICKS = 600  # after which a session lapses
+_QUIET_TICKS = 60  # after which nothing of an earlier fault is on its way any more
+_REST_PERIODS, _WAIT_PERIODS_MAX = 50, 400
+_REPEAT_PERIODS = 60  # periods in which a healthy start must have full authority
+_NEAR_RAD = 3.0  # rad
+_COUNT_RAD = 2.0 * math.tau / 4096  # rad
 
 
 class Start(NamedTuple):
@@ -97,7 +98,7 @@ class System:
         ticking = zip(FAULTS, tuple(self._injector.timers), strict=True)
         self._injector.timers[:] = [timer for kind, timer in ticking if kind in _TICKING]  # for speed
         self._ends: dict[str, int] = {}  # ticks of the board
-        self._disturbed = -_QUIET  # tick of the board at which the last fault was on
+        self._disturbed = -_QUIET_TICKS  # tick of the board at which the last fault was on
         self._plug_in()
         self.host: Host | None = None
         self.refused = ""  # why the last host could not open it
@@ -110,7 +111,7 @@ class System:
     @property
     def quiet(self) -> bool:
         """Whether what one side says reaches the other, and has for a while."""
-        return self.board.tick_count - self._disturbed > _QUIET
+        return self.board.tick_count - self._disturbed > _QUIET_TICKS
 
     def open(self, *, clear: bool = False) -> bool:
         """Let a host open the device, with --clear or without; False if it cannot, or one has it open."""
@@ -187,7 +188,7 @@ class System:
 
     def seq(self, age: int = 0) -> int:
         """Return the seq of a command that answers a SAMPLE of that age."""
-        return (self.judge.newest - age) & _SEQ
+        return (self.judge.newest - age) & _SEQUENCE_MASK
 
     def reset(self) -> None:
         """Press the board's button."""
@@ -201,15 +202,15 @@ class System:
             self._end(kind)
         self.board.link(up=True)
         self.inject(b"\0")  # ends an unfinished frame on the line
-        self.alone(_LEASE)
-        for _ in range(_PATIENCE):
+        self.alone(_LEASE_TICKS)
+        for _ in range(_WAIT_PERIODS_MAX):
             if self.board.truth().velocity == 0.0:
                 break
-            self.alone(_REST)
-        if not abs(self.board.truth().position) < _NEAR:
+            self.alone(_REST_PERIODS)
+        if not abs(self.board.truth().position) < _NEAR_RAD:
             self._unwind()
             self.reset()  # the count went back by whole turns, which a running board would call jumps
-        self.alone(_QUIET + 1)
+        self.alone(_QUIET_TICKS + 1)
 
     def _unwind(self) -> None:
         """Bring back an arm that hangs whole turns away: travel counts from hanging, over a reset too."""
@@ -225,7 +226,7 @@ class System:
         if not self.open(clear=True):
             self.judge.note(f"healed, it does not open: {self.refused}")
             return
-        for _ in range(_AGAIN):
+        for _ in range(_REPEAT_PERIODS):
             self.period(0.2)
         host = self.host
         if host is None or not host.has_authority or self.board.state != State.RUN:
@@ -240,7 +241,7 @@ class System:
         if self.judge.told != State.RUN:
             self.judge.note(f"the device is in state {self.judge.told}, the host in {host.supervisor.phase}")
         sample, truth = host.sample, self.board.truth()
-        if not abs(sample.position - truth.position) < _ENCODER:
+        if not abs(sample.position - truth.position) < _COUNT_RAD:
             self.judge.note(f"the arm is at {truth.position} rad, the host says {sample.position}")
 
     def _plug_in(self) -> FaultyLink:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.messages import Message
 
-TTL = 5  # ms: the shortest watchdog
-RULES = Rules(arming=10, oldest=3, watchdog=TTL)
+TTL_MS = 5  # ms: the shortest watchdog
+RULES = Rules(arming=10, oldest=3, watchdog=TTL_MS)
 TOO_FAST = 42  # counts a period
 SESSIONS = (1, 2)
 FLAGS = ("arm", "", "clear", "release")
@@ -46,7 +46,7 @@ class Twin:
     def command(self, command: Command) -> None:
         seq = (self.device.tick - command.age) & 0x1FFF
         arm, clear, release = (command.flag == name for name in ("arm", "clear", "release"))
-        self.say(Drive(1000 * command.volts, seq, arm, clear, release, command.session, TTL))
+        self.say(Drive(1000 * command.volts, seq, arm, clear, release, command.session, TTL_MS))
 
     def tick(self) -> None:
         self.now += 1000
@@ -147,11 +147,11 @@ def test_firmware_goes_where_the_model_goes(core: Core) -> None:
 
 
 OTHERS = {
-    "nine commands arm": Rules(9, 3, TTL),
-    "older commands are taken": Rules(10, 4, TTL),
-    "the watchdog is a period late": Rules(10, 3, TTL + 1),
-    "release clears a fault": Rules(10, 3, TTL, NEXT | {"release": NEXT["clear"]}),
-    "a limit disarms, and is forgotten": Rules(10, 3, TTL, NEXT | {"limit": NEXT["disarm"]}),
+    "nine commands arm": Rules(9, 3, TTL_MS),
+    "older commands are taken": Rules(10, 4, TTL_MS),
+    "the watchdog is a period late": Rules(10, 3, TTL_MS + 1),
+    "release clears a fault": Rules(10, 3, TTL_MS, NEXT | {"release": NEXT["clear"]}),
+    "a limit disarms, and is forgotten": Rules(10, 3, TTL_MS, NEXT | {"limit": NEXT["disarm"]}),
 }
 
 

@@ -11,9 +11,9 @@ from hypothesis.stateful import run_state_machine_as_test
 from tests.stateful.machine import Machine
 
 STEPS = int(os.environ.get("DCMP_STATEFUL_STEPS", "100000"))
-PARTS = 8  # of them, each with a seed of its own
-LENGTH = 250  # rules in an example at most; the mean is nearly that
-_MEAN = 195  # steps of an example at least, over many: Hypothesis draws by what else is imported
+PART_COUNT = 8  # of them, each with a seed of its own
+RULES_PER_RUN = 250  # rules in an example at most; the mean is nearly that
+_MEAN_STEPS_MIN = 195  # steps of an example at least, over many: Hypothesis draws by what else is imported
 
 
 def budget(examples: int, length: int) -> settings:
@@ -26,10 +26,10 @@ def budget(examples: int, length: int) -> settings:
 
 @pytest.mark.sampled
 @pytest.mark.usefixtures("untraced")
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("part", range(PART_COUNT))
 def test_no_sequence_of_events_breaks_a_rule(part: int) -> None:
-    steps = STEPS // PARTS
+    steps = STEPS // PART_COUNT
     Machine.steps = 0
     machine = seed(part)(type("Part", (Machine,), {}))
-    run_state_machine_as_test(machine, settings=budget(1 + steps // _MEAN, LENGTH))
+    run_state_machine_as_test(machine, settings=budget(1 + steps // _MEAN_STEPS_MIN, RULES_PER_RUN))
     assert Machine.steps >= steps, f"{Machine.steps} steps are fewer than {steps}"

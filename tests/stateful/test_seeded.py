@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.values import Estimate, Sample
 
-EXAMPLES, LENGTH = 1000, 100
+EXAMPLE_COUNT, RULES_PER_RUN = 1000, 100
 """It ends with the first find, within 170 for every error and each of eight seeds: Hypothesis draws by what
 else is imported, so no smaller number holds in every order of the tests."""
 Patch = pytest.MonkeyPatch
@@ -100,7 +100,7 @@ IN_FIRMWARE = {
 def found() -> str:
     """Return the violations that the machine finds."""
     with pytest.raises(AssertionError) as caught:
-        run_state_machine_as_test(Machine, settings=budget(EXAMPLES, LENGTH))
+        run_state_machine_as_test(Machine, settings=budget(EXAMPLE_COUNT, RULES_PER_RUN))
     return str(caught.value)
 
 

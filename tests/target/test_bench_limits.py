@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.values import Truth
 
-_PUSHED = 400  # periods at most
+_PUSHED_PERIODS = 400  # periods at most
 
 
 def _pushed(f405: Path, volts: float, *overrides: str) -> tuple[TargetBoard, int, float, float]:
@@ -37,7 +37,7 @@ def _pushed(f405: Path, volts: float, *overrides: str) -> tuple[TargetBoard, int
         seen.append((board.enable, board.truth()))
 
     board.tick = watched_tick  # type: ignore[method-assign]
-    for _ in range(_PUSHED):
+    for _ in range(_PUSHED_PERIODS):
         sample = host.read()
         if sample.fault:
             break

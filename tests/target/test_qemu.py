@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 STILL = ("model.eta_rad_s2=0.0", "model.eta_amplitude_rad_s2=0.0")  # no disturbance that depends on the time
-CYCLES = 5000
+CYCLE_COUNT = 5000
 _PATIENT_MS = 10_000
 
 
@@ -58,7 +58,7 @@ def trace(program: Sequence[str], link: str, cycles: int) -> str:
 
 
 def test_trace_is_that_of_the_native_board(qemu: Sequence[str]) -> None:
-    assert trace(qemu, "cobs", CYCLES) == trace((), "cobs", CYCLES)
+    assert trace(qemu, "cobs", CYCLE_COUNT) == trace((), "cobs", CYCLE_COUNT)
 
 
 def test_trace_is_that_of_the_native_board_over_slcan(qemu: Sequence[str]) -> None:

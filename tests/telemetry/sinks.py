@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 
 T = 1e-3  # s
-BOUND_S = 60.0  # s: generous, these machines are shared
+TIMEOUT_S = 60.0  # s: generous, these machines are shared
 HELD = Reference(0.0, 0.0, 0.0)
 
 

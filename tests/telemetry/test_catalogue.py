@@ -23,10 +23,10 @@ from tests.namespaces import in_own_namespace
 
 _PERIODS = 4000
 _RUN = ("run", "--duration", "4", "--json", "figures.json")
-_INCOMPLETE = 6  # exit code: the recording is
-_BOUND_S = 60.0
+_INCOMPLETE_EXIT_CODE = 6  # exit code: the recording is
+_TIMEOUT_S = 60.0
 _SECOND_BYTES = 130_000  # of run.mcap, at 1 kHz
-_FIRST = 27_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+_FIRST_PORT = 27_000 + 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 
 
 class Host:
@@ -34,7 +34,7 @@ class Host:
 
     def __init__(self, folder: Path, *options: str) -> None:
         environment = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-        ports = f"from dcmp_hil.telemetry.rerun import viewer; viewer.VIEWER_PORT = {_FIRST}"
+        ports = f"from dcmp_hil.telemetry.rerun import viewer; viewer.VIEWER_PORT = {_FIRST_PORT}"
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-c", f"{ports}; from dcmp_hil.cli import main; main()", *_RUN, *options],
@@ -58,7 +58,7 @@ class Host:
 
     def figures(self, code: int = 0) -> tuple[dict[str, Any], str]:
         """Wait for its end; return its figures and what it said."""
-        _, said = self.process.communicate(timeout=_BOUND_S)
+        _, said = self.process.communicate(timeout=_TIMEOUT_S)
         assert self.process.returncode == code, said
         figures: dict[str, Any] = json.loads((self.folder / "figures.json").read_text())
         return figures, " ".join(said.split())
@@ -71,7 +71,7 @@ def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dcmp_hil", *_RUN, "--viewer", "none"]
     done = subprocess.run(
         [*in_own_namespace("mount"), "sh", "-c", script, "sh", *command],
-        cwd=tmp_path, check=False, capture_output=True, text=True, timeout=_BOUND_S,
+        cwd=tmp_path, check=False, capture_output=True, text=True, timeout=_TIMEOUT_S,
     )  # fmt: skip
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert figures["periods"] == _PERIODS
@@ -81,7 +81,7 @@ def test_s08_a_disk_that_is_full(tmp_path: Path) -> None:
     assert len(troubles) == len(figures["troubles"])
     assert 1 <= len(troubles) <= 3  # run.mcap that waits and has no end, and run.rrd
     complete = figures["recording"]["complete"]
-    assert done.returncode == (0 if complete else _INCOMPLETE), done.stderr
+    assert done.returncode == (0 if complete else _INCOMPLETE_EXIT_CODE), done.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
@@ -90,7 +90,7 @@ def test_s09_telemetry_that_is_killed_or_stands_still(tmp_path: Path, number: si
     pid = host.telemetry()
     until(lambda: host.recorded_bytes() > _SECOND_BYTES, "a second was recorded")
     os.kill(pid, number)
-    figures, said = host.figures(_INCOMPLETE)
+    figures, said = host.figures(_INCOMPLETE_EXIT_CODE)
     assert figures["ended_by"] == "recording_incomplete"
     assert figures["periods"] == _PERIODS
     assert figures["dropped_periods"] == 0
@@ -106,10 +106,10 @@ def test_s09_telemetry_that_is_killed_or_stands_still(tmp_path: Path, number: si
 def test_s10_a_viewer_that_is_killed_or_stands_still(tmp_path: Path, number: signal.Signals) -> None:
     host = Host(tmp_path, "--viewer", "serve")
     telemetry = host.telemetry()
-    until(lambda: bool(window.served(_FIRST)), "it was served")
+    until(lambda: bool(window.served(_FIRST_PORT)), "it was served")
     options = ["--headless", "--bind", window.LOOPBACK, "--port", "auto", "--hide-welcome-screen"]
     viewer = subprocess.Popen(
-        [window.viewer_binary(), *options, "--connect", window.proxy_url(window.served(_FIRST)[0])],
+        [window.viewer_binary(), *options, "--connect", window.proxy_url(window.served(_FIRST_PORT)[0])],
         env=window.viewer_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:

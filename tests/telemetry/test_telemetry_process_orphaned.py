@@ -15,7 +15,7 @@ from dcmp_hil import load_rig, run
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from tests.live.processes import until
 from tests.telemetry.runs import VIEW, values
-from tests.telemetry.sinks import BOUND_S, noted
+from tests.telemetry.sinks import TIMEOUT_S, noted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,7 +48,7 @@ def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
     with subprocess.Popen([sys.executable, "-c", _RUNS_ON, str(tmp_path)], stderr=subprocess.PIPE) as process:
         until(lambda: notes.exists() and len(noted(notes, "rows")) >= 5, "rows came")
         process.send_signal(number)
-        process.communicate(timeout=BOUND_S)  # until every process with its standard error has ended, too
+        process.communicate(timeout=TIMEOUT_S)  # until every process with its standard error has ended, too
     pid = int(noted(notes, "pid")[0])
     until(lambda: not Path(f"/proc/{pid}").exists(), "it ended")
     assert noted(notes, "closed") == [""]

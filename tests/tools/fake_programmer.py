@@ -12,17 +12,18 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-OPTKEYR, OPTCR, DHCSR, FREEZE = 0x4002_3C08, 0x4002_3C14, 0xE000_EDF0, 0xE004_2008
-KEYS = [0x0819_2A3B, 0x4C5D_6E7F]
-LOCK, START, HALTED = 1, 2, 1 << 17
+OPTKEYR_ADDRESS, OPTCR_ADDRESS = 0x4002_3C08, 0x4002_3C14
+DHCSR_ADDRESS, FREEZE_ADDRESS = 0xE000_EDF0, 0xE004_2008
+OPTION_KEYS = [0x0819_2A3B, 0x4C5D_6E7F]
+LOCK_BIT, START_BIT, HALTED_BIT = 1, 2, 1 << 17
 
 
 def install(folder: Path, word: int, **chip: Any) -> Path:
     """Put both programmers into a folder; return the file with the chip."""
     kept = folder / "chip.json"
     fresh = {
-        "stored": word | LOCK,
-        "optcr": word | LOCK,
+        "stored": word | LOCK_BIT,
+        "optcr": word | LOCK_BIT,
         "keys": 0,
         "halted": False,
         "started": [],
@@ -46,29 +47,29 @@ def chip(kept: Path) -> dict[str, Any]:
 
 
 def reset(chip: dict[str, Any], *, halt: bool) -> None:
-    chip |= {"optcr": chip["stored"] | LOCK, "keys": 0, "halted": halt and chip["halts"]}
+    chip |= {"optcr": chip["stored"] | LOCK_BIT, "keys": 0, "halted": halt and chip["halts"]}
 
 
 def write(chip: dict[str, Any], address: int, value: int) -> None:
-    if address == OPTKEYR:
-        good = chip["keys"] < len(KEYS) and value == KEYS[chip["keys"]]
-        chip["keys"] = chip["keys"] + 1 if good else len(KEYS) + 1
-        if chip["keys"] == len(KEYS):
-            chip["optcr"] &= ~LOCK
-    elif address == OPTCR:
-        assert not chip["optcr"] & LOCK, "the option word is written while it is locked"
-        if value & START:
+    if address == OPTKEYR_ADDRESS:
+        good = chip["keys"] < len(OPTION_KEYS) and value == OPTION_KEYS[chip["keys"]]
+        chip["keys"] = chip["keys"] + 1 if good else len(OPTION_KEYS) + 1
+        if chip["keys"] == len(OPTION_KEYS):
+            chip["optcr"] &= ~LOCK_BIT
+    elif address == OPTCR_ADDRESS:
+        assert not chip["optcr"] & LOCK_BIT, "the option word is written while it is locked"
+        if value & START_BIT:
             assert chip["halted"], "a program runs that could disturb it"
-            assert value & ~START == chip["optcr"], "started with other settings than were written"
-            chip["started"].append(value & ~START)
-            chip["stored"] = chip["stored"] if chip["stubborn"] else value & ~(START | LOCK)
-        chip["optcr"] = value & ~START
+            assert value & ~START_BIT == chip["optcr"], "started with other settings than were written"
+            chip["started"].append(value & ~START_BIT)
+            chip["stored"] = chip["stored"] if chip["stubborn"] else value & ~(START_BIT | LOCK_BIT)
+        chip["optcr"] = value & ~START_BIT
     else:
-        assert address == FREEZE, hex(address)
+        assert address == FREEZE_ADDRESS, hex(address)
 
 
 def save(chip: dict[str, Any], address: int, length: int, file: str) -> None:
-    word = {OPTCR: chip["optcr"], DHCSR: HALTED if chip["halted"] else 0}[address]
+    word = {OPTCR_ADDRESS: chip["optcr"], DHCSR_ADDRESS: HALTED_BIT if chip["halted"] else 0}[address]
     Path(file).write_bytes(word.to_bytes(4, "little")[: 1 if chip["short"] else length])
 
 

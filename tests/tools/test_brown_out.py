@@ -16,10 +16,10 @@ from tools.brown_out import OPTCR_ADDRESS, OptionError, check_written, level, pl
 if TYPE_CHECKING:
     from pathlib import Path
 
-FACTORY = 0x0FFF_AAED
-BOR, COMMANDS, LOCKED = 0xC, 0x3, 0x1
+FACTORY_WORD = 0x0FFF_AAED
+BOR_LEV_BITS, COMMANDS, LOCKED = 0xC, 0x3, 0x1
 RESERVED = 0xF000_0010
-NONE, FOR_EVER = 0xAA, 0xCC
+RDP_NONE, RDP_LOCKED = 0xAA, 0xCC
 
 
 def protection(word: int) -> int:
@@ -31,19 +31,19 @@ def judged(word: int) -> bool:
     try:
         settings = planned(word)
     except OptionError:
-        assert protection(word) != NONE or word & COMMANDS != LOCKED or word & RESERVED
+        assert protection(word) != RDP_NONE or word & COMMANDS != LOCKED or word & RESERVED
         return False
     assert word & COMMANDS == LOCKED
     assert not word & RESERVED
-    assert protection(word) == NONE
+    assert protection(word) == RDP_NONE
     if settings is None:
-        assert word & BOR == 0
+        assert word & BOR_LEV_BITS == 0
         return False
     for write in writes(settings):
         if write.address == OPTCR_ADDRESS:
-            assert protection(write.value) == NONE
-            assert (write.value ^ word) & ~(BOR | COMMANDS) & 0xFFFF_FFFF == 0
-            assert write.value & BOR == 0
+            assert protection(write.value) == RDP_NONE
+            assert (write.value ^ word) & ~(BOR_LEV_BITS | COMMANDS) & 0xFFFF_FFFF == 0
+            assert write.value & BOR_LEV_BITS == 0
     return True
 
 
@@ -61,18 +61,18 @@ def test_no_word_changes_more_than_the_level_nor_locks_the_chip() -> None:
 
 @pytest.mark.parametrize("high", [0x0000, 0x0FFF, 0x0800, 0x0001, 0x07FF, 0x0AAA])
 def test_every_write_protection_is_left_as_it_is(high: int) -> None:
-    assert sum(judged(high << 16 | NONE << 8 | low) for low in range(256)) == 24
+    assert sum(judged(high << 16 | RDP_NONE << 8 | low) for low in range(256)) == 24
 
 
 @pytest.mark.parametrize("rest", [0x0FFF_00ED, 0x0000_0001, 0x0FFF_00E1])
 def test_any_other_protection_is_refused(rest: int) -> None:
     for value in range(256):
-        if value == NONE:
+        if value == RDP_NONE:
             planned(rest | value << 8)
             continue
         with pytest.raises(OptionError, match="Nothing was written") as told:
             planned(rest | value << 8)
-        assert ("for ever" in str(told.value)) == (value == FOR_EVER)
+        assert ("for ever" in str(told.value)) == (value == RDP_LOCKED)
 
 
 @pytest.mark.parametrize(
@@ -93,21 +93,21 @@ def test_word_that_does_not_say_what_the_chip_does_is_refused(word: int, said: s
 
 
 def test_factory_word_becomes_level_3() -> None:
-    assert planned(FACTORY) == 0x0FFF_AAE0
+    assert planned(FACTORY_WORD) == 0x0FFF_AAE0
     assert [hex(write.value) for write in writes(0x0FFF_AAE0)] == [
         "0x8192a3b", "0x4c5d6e7f", "0xfffaae0", "0xfffaae2", "0xfffaae1",
     ]  # fmt: skip
-    assert [level(FACTORY & ~BOR | bits << 2) for bits in (0b11, 0b10, 0b01, 0b00)] == [
+    assert [level(FACTORY_WORD & ~BOR_LEV_BITS | bits << 2) for bits in (0b11, 0b10, 0b01, 0b00)] == [
         "off", "level 1", "level 2", "level 3",
     ]  # fmt: skip
 
 
 def test_write_that_is_cut_short_never_shows_the_protection_that_is_for_ever() -> None:
     """The word is erased to ones; any of the bits that are zero in the end may be programmed by then."""
-    zeros = [bit for bit in range(8) if not NONE >> bit & 1]
+    zeros = [bit for bit in range(8) if not RDP_NONE >> bit & 1]
     seen = {0xFF & ~sum(1 << bit for i, bit in enumerate(zeros) if some >> i & 1) for some in range(16)}
-    assert FOR_EVER not in seen
-    assert NONE in seen
+    assert RDP_LOCKED not in seen
+    assert RDP_NONE in seen
 
 
 @pytest.mark.parametrize("bit", range(32))
@@ -143,15 +143,15 @@ def run(folder: Path, monkeypatch: pytest.MonkeyPatch, by: str, *options: str) -
 ALL = ["0x8004000", "0x800c000", "0x8000000"]
 
 
-@pytest.mark.parametrize("word", [FACTORY, 0x0FFE_AAE9, 0x0123_AA85])
+@pytest.mark.parametrize("word", [FACTORY_WORD, 0x0FFE_AAE9, 0x0123_AA85])
 def test_probe_sets_level_3_and_then_flashes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: int
 ) -> None:
     kept = fake_programmer.install(tmp_path, word)
     assert run(tmp_path, monkeypatch, "pyocd") == 0
     found = fake_programmer.chip(kept)
-    assert found["started"] == [word & ~BOR & ~COMMANDS]
-    assert found["optcr"] == word & ~BOR & ~COMMANDS | 1
+    assert found["started"] == [word & ~BOR_LEV_BITS & ~COMMANDS]
+    assert found["optcr"] == word & ~BOR_LEV_BITS & ~COMMANDS | 1
     assert (found["halted"], found["flashed"]) == (False, ALL)
 
 
@@ -169,9 +169,13 @@ def test_chip_that_has_level_3_is_left_alone(tmp_path: Path, monkeypatch: pytest
         (0x0FFF_CCED, {}, "locked for ever"),
         (0xFFFF_FFFF, {}, "not read rightly"),
         (0, {}, "not read rightly"),
-        (FACTORY, {"halts": False}, "did not halt"),
-        (FACTORY, {"short": True}, "1 bytes were read, expected 4"),
-        (FACTORY, {"stubborn": True}, "option word 0x0fffaaed after it was written, expected 0x0fffaae1"),
+        (FACTORY_WORD, {"halts": False}, "did not halt"),
+        (FACTORY_WORD, {"short": True}, "1 bytes were read, expected 4"),
+        (
+            FACTORY_WORD,
+            {"stubborn": True},
+            "option word 0x0fffaaed after it was written, expected 0x0fffaae1",
+        ),
     ],
 )
 def test_refusal_writes_nothing_else(
@@ -190,7 +194,7 @@ def test_refusal_writes_nothing_else(
 
 
 @pytest.mark.parametrize(
-    ("word", "warned"), [(FACTORY, "is off"), (0x0FFF_AAE9, "is level 1"), (0x0FFF_AAE1, "")]
+    ("word", "warned"), [(FACTORY_WORD, "is off"), (0x0FFF_AAE9, "is level 1"), (0x0FFF_AAE1, "")]
 )
 def test_boot_loader_looks_and_warns(
     tmp_path: Path,
@@ -213,7 +217,7 @@ def test_probe_that_is_pulled_out_is_told_and_the_next_call_trusts_no_register(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], writes_done: int
 ) -> None:
     """After the third of them the register says level 3, and the chip has it off."""
-    kept = fake_programmer.install(tmp_path, FACTORY, dies=writes_done)
+    kept = fake_programmer.install(tmp_path, FACTORY_WORD, dies=writes_done)
     assert run(tmp_path, monkeypatch, "pyocd", "--only", "brown-out") == 3
     assert "Switch the board's supply off and on" in capsys.readouterr().err
     kept.write_text(json.dumps(fake_programmer.chip(kept) | {"dies": 99}))
@@ -224,21 +228,21 @@ def test_probe_that_is_pulled_out_is_told_and_the_next_call_trusts_no_register(
     assert ("begun and not ended" in refused) == unlocked
     if not unlocked:
         assert said.endswith("brown-out level: level 3 (it was off)\n")
-        assert fake_programmer.chip(kept)["stored"] & BOR == 0
+        assert fake_programmer.chip(kept)["stored"] & BOR_LEV_BITS == 0
 
 
 @pytest.mark.parametrize("only", ["record", "program"])
 def test_option_word_is_only_looked_at_where_a_part_is_flashed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], only: str
 ) -> None:
-    kept = fake_programmer.install(tmp_path, FACTORY)
+    kept = fake_programmer.install(tmp_path, FACTORY_WORD)
     assert run(tmp_path, monkeypatch, "pyocd", "--only", only) == 0
     assert "brown-out level is off" in capsys.readouterr().err
     assert (fake_programmer.chip(kept)["started"], fake_programmer.chip(kept)["keys"]) == ([], 0)
 
 
 @pytest.mark.parametrize(
-    ("word", "code", "said"), [(FACTORY, 3, "is off"), (0x0FFF_AAE1, 0, ""), (0, 3, "is not known")]
+    ("word", "code", "said"), [(FACTORY_WORD, 3, "is off"), (0x0FFF_AAE1, 0, ""), (0, 3, "is not known")]
 )
 def test_boot_loader_cannot_set_the_level_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], word: int, code: int,

@@ -15,7 +15,7 @@ from tools.soak.result import Soaked
 if TYPE_CHECKING:
     from pathlib import Path
 
-MB = 1_000_000
+BYTES_PER_MB = 1_000_000
 
 
 def half_an_hour(leak: float, seed: int) -> Growth:
@@ -73,15 +73,15 @@ def test_the_least_of_a_minute_counts() -> None:
 
 def test_what_a_process_has_for_itself_counts_and_what_it_maps_of_files_does_not(tmp_path: Path) -> None:
     file = tmp_path / "library"
-    file.write_bytes(bytes(20 * MB))
+    file.write_bytes(bytes(20 * BYTES_PER_MB))
     memory, me = Memory(), {"me": os.getpid()}
     memory.look(0, me, os.getpid())
     with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
         assert sum(mapped[::4096]) == 0
         memory.look(1, me, os.getpid())
         private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS  # and not malloc, which may have so much to spare
-        with mmap.mmap(-1, 20 * MB, flags=private) as kept:
-            for at in range(0, 20 * MB, 4096):
+        with mmap.mmap(-1, 20 * BYTES_PER_MB, flags=private) as kept:
+            for at in range(0, 20 * BYTES_PER_MB, 4096):
                 kept[at] = 1
             memory.look(2, me, os.getpid())
     before, with_file, with_memory = memory.growth["me"].mb
@@ -94,7 +94,7 @@ def test_files_in_memory_count_once_and_apart() -> None:
     try:
         memory = Memory()
         memory.look(0, {}, os.getpid())
-        os.write(descriptor, bytes(10 * MB))
+        os.write(descriptor, bytes(10 * BYTES_PER_MB))
         other = os.dup(descriptor)
         memory.look(1, {}, os.getpid())
         os.close(other)

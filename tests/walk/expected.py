@@ -39,7 +39,7 @@ _SAYS: Mapping[str, tuple[str, ...]] = {
     "panel": (r"Ctrl-C ends the page; .*", r"warning: No web viewer .*"),
     "monitor": (r".*",),
 }
-_REFUSED = 2
+_REFUSED_EXIT_CODE = 2
 
 
 def check(command: str, chosen: Mapping[str, tuple[str, ...]], called: Called, folder: Path) -> None:
@@ -56,7 +56,7 @@ def check(command: str, chosen: Mapping[str, tuple[str, ...]], called: Called, f
     assert called.code in _codes(command, chosen), told
     if stream not in {*TAKES_NOTHING[-1:], TERMINAL}:
         _check_lines(command, called)
-    if called.code != _REFUSED:
+    if called.code != _REFUSED_EXIT_CODE:
         _check_files(command, chosen, folder, called)
 
 
@@ -64,13 +64,13 @@ def _codes(command: str, chosen: Mapping[str, tuple[str, ...]]) -> set[int]:
     if command == "run":
         return {4} if "shove" in "".join(chosen["--fault"]) else {0}
     if command == "export":
-        return {0 if any(chosen[name] for name in ("--csv", "--parquet", "--rrd")) else _REFUSED}
+        return {0 if any(chosen[name] for name in ("--csv", "--parquet", "--rrd")) else _REFUSED_EXIT_CODE}
     if command == "view":
-        return {0 if chosen["--web"] else _REFUSED}
+        return {0 if chosen["--web"] else _REFUSED_EXIT_CODE}
     if command == "replay" or (command == "panel" and chosen["--web"]):
-        return {0, _REFUSED}
+        return {0, _REFUSED_EXIT_CODE}
     if command == "conform":
-        return {0} if chosen["--list"] or chosen["--link"] == () else {0, _REFUSED, 3}
+        return {0} if chosen["--list"] or chosen["--link"] == () else {0, _REFUSED_EXIT_CODE, 3}
     return {0}
 
 
@@ -78,7 +78,7 @@ def _check_lines(command: str, called: Called) -> None:
     lines = [line for line in called.err.splitlines() if line]
     errors = [line for line in lines if line.startswith("error: ")]
     assert bool(errors) == bool(called.code), called.err
-    assert len(errors) <= 1 or called.code == _REFUSED, called.err
+    assert len(errors) <= 1 or called.code == _REFUSED_EXIT_CODE, called.err
     known = re.compile("|".join(("error: .*", *_SAYS.get(command, ()))))
     unknown = [line for line in lines if not known.fullmatch(line)]
     assert not unknown, f"not documented: {unknown}"

@@ -37,7 +37,7 @@ _ENCODINGS = {
     LATIN: {"PYTHONIOENCODING": "latin-1"},
     ASCII: {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
 }
-_LIMIT = 300.0  # s: a computer may be busy
+_TIMEOUT_S = 300.0  # s: a computer may be busy
 _CLOSING = {CLOSED: ">&-", SILENT: ">&- 2>&-", FULL: ">/dev/full"}
 
 
@@ -85,7 +85,7 @@ def _text(data: bytes) -> str:
 
 def _collected(process: subprocess.Popen[bytes]) -> tuple[bytes | None, bytes]:
     try:
-        return process.communicate(timeout=_LIMIT)
+        return process.communicate(timeout=_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         raise
@@ -111,10 +111,10 @@ def _on_terminal(
         reader.start()
         _interrupt(process, until)
         try:
-            process.wait(_LIMIT)
+            process.wait(_TIMEOUT_S)
         finally:
             process.kill()
-        reader.join(_LIMIT)
+        reader.join(_TIMEOUT_S)
     os.close(ours)
     return Called(process.returncode, "", _text(b"".join(shown)))
 
@@ -129,7 +129,7 @@ def _interrupt(process: subprocess.Popen[bytes], until: Callable[[int], bool] | 
     if until is None:
         return
     waited = threading.Event()
-    for _ in range(round(_LIMIT / 0.1)):
+    for _ in range(round(_TIMEOUT_S / 0.1)):
         if process.poll() is not None:
             return
         if until(process.pid):

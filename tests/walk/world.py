@@ -19,7 +19,7 @@ from tests.installed import environment
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_LIMIT = 300.0  # s: a computer may be busy
+_TIMEOUT_S = 300.0  # s: a computer may be busy
 _RUN = ("run", "--no-record", "--duration", "0", "--set", "supervisor.monitors=finite")
 
 
@@ -121,7 +121,7 @@ class World:
             env=environment(**self.env),
             capture_output=True,
             text=True,
-            timeout=_LIMIT,
+            timeout=_TIMEOUT_S,
             check=False,
         )
         return "running" in done.stdout
@@ -154,12 +154,12 @@ class World:
             cwd=self._folder,
             env=environment(**self.env),
             capture_output=True,
-            timeout=_LIMIT,
+            timeout=_TIMEOUT_S,
             check=True,
         )
 
     def _until(self, done: Callable[[], object], what: str) -> None:
-        end = time.monotonic() + _LIMIT
+        end = time.monotonic() + _TIMEOUT_S
         while not done():
             assert time.monotonic() < end, f"never: {what}"
             time.sleep(0.1)

@@ -7,7 +7,7 @@ import select
 import socket
 import sys
 
-MANY = 1_100
+CONNECTION_COUNT = 1_100
 _REQUEST = (
     b"POST /stop HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nOrigin: http://127.0.0.1:%d\r\n"
     b"Cookie: x=wrong\r\nContent-Length: 2\r\n\r\n{}"
@@ -29,7 +29,7 @@ def half_open(target: str) -> None:
     held: list[socket.socket] = []
     while True:
         try:
-            while len(held) < MANY:
+            while len(held) < CONNECTION_COUNT:
                 held.append(_open(target))
                 if len(held) % 2:
                     held[-1].sendall(b"POST /stop HT")

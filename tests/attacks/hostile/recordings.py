@@ -18,7 +18,7 @@ from dcmp_hil.recording.schema import CYCLE_SCHEMA
 from tests.helpers import bench
 
 MAGIC = b"\x89MCAP0\r\n"
-BEGAN = 1_767_225_600_000_000_000
+BEGAN_NS = 1_767_225_600_000_000_000
 RUN = {"format": "2", "version": "0.1", "rig": "bench-1khz", "note": "", "faults": "[]"}
 ESCAPE = "\x1b]0;owned\x07\x1b[2J\x1b[31mred\x9b31m\r\n\u202eeslaf"
 
@@ -47,7 +47,7 @@ def chunk(
 
 
 def attachment(name: str, data: bytes, size: int | None = None) -> bytes:
-    content = struct.pack("<QQ", BEGAN, BEGAN) + text(name) + text("application/json")
+    content = struct.pack("<QQ", BEGAN_NS, BEGAN_NS) + text(name) + text("application/json")
     content += struct.pack("<Q", len(data) if size is None else size) + data
     return record(0x09, content + struct.pack("<I", zlib.crc32(content)))
 
@@ -58,7 +58,7 @@ def message(channel: int, sequence: int, at: int, data: bytes) -> bytes:
 
 def row(number: int, t: float | None = None, **fields: float) -> bytes:
     values = dict.fromkeys(FIELDS, 0.0) | {"t": number * 1e-3 if t is None else t} | fields
-    at = BEGAN + (round(values["t"] * 1e9) if abs(values["t"]) < 1e9 else 0)
+    at = BEGAN_NS + (round(values["t"] * 1e9) if abs(values["t"]) < 1e9 else 0)
     return message(1, number, at, b"\0\1\0\0" + np.array(list(values.values()), "<f8").tobytes())
 
 
@@ -68,7 +68,7 @@ def rows(count: int = 50, **fields: float) -> bytes:
 
 def event(number: int, document: Any, t: float = 0.0) -> bytes:
     data = document if isinstance(document, bytes) else json.dumps(document).encode()
-    return message(2, number, BEGAN + round(t * 1e9), data)
+    return message(2, number, BEGAN_NS + round(t * 1e9), data)
 
 
 def told(number: int, said: str, **more: Any) -> bytes:

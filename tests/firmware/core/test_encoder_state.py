@@ -4,7 +4,7 @@ import pytest
 
 from tests.firmware.bench import Bench, Core
 
-LIMIT, PERIOD = 40_000, 1000
+SPEED_LIMIT_COUNTS_S, PERIOD_US = 40_000, 1000
 ENCODER_JUMP = 7
 
 
@@ -21,7 +21,7 @@ def test_speed_is_taken_over_1_and_2_and_8_ms_or_more(core: Core) -> None:
 
 def test_position_is_the_middle_one_of_three(core: Core) -> None:
     encoder = core.new("struct dcmp_encoder *")
-    core.lib.dcmp_encoder_init(encoder, PERIOD)
+    core.lib.dcmp_encoder_init(encoder, PERIOD_US)
     for newest in [(0, 100, 50), (100, 50, 0), (50, 0, 100), (7, 7, 9), (-3, -5, -4)]:
         for ago, position in enumerate((*newest, 200, 300)):
             encoder.past[-ago % len(encoder.past)] = position
@@ -32,9 +32,9 @@ def test_position_is_the_middle_one_of_three(core: Core) -> None:
 def test_jump_right_after_the_first_count(core: Core, second: int) -> None:
     """There is no count before the first: a wrong second one is not measured from 0."""
     encoder = core.new("struct dcmp_encoder *")
-    core.lib.dcmp_encoder_init(encoder, PERIOD)
+    core.lib.dcmp_encoder_init(encoder, PERIOD_US)
     for counts, jumped in [(1000, False), (second, True), (1000, True), (1003, False)]:
-        core.lib.dcmp_encoder_tick(encoder, counts, LIMIT, PERIOD)
+        core.lib.dcmp_encoder_tick(encoder, counts, SPEED_LIMIT_COUNTS_S, PERIOD_US)
         assert encoder.jumped is jumped
         assert encoder.position == (3 if counts == 1003 else 0)
     assert encoder.jump == 1000 - (second if second < 1 << 23 else second - (1 << 24))

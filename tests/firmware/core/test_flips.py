@@ -116,7 +116,7 @@ STEPS = {
     if (ord(DIGITS[old]) ^ ord(DIGITS[new])).bit_count() == 1
 }
 """Hex digits that one flipped bit turns into one another."""
-YOUNG = 31  # periods; the device takes a DRIVE no older than 3 ms, 30 periods at 10 kHz
+AGE_MAX_PERIODS = 31  # periods; the device takes a DRIVE no older than 3 ms, 30 periods at 10 kHz
 
 
 def _may_be_accepted(first: int, x: int, second: int, y: int) -> bool:
@@ -144,8 +144,8 @@ def _word_may_be(changes: dict[int, tuple[int, int]]) -> bool:
         damaged = word
         for at, (old, new) in inside.items():
             damaged ^= (old ^ new) << at
-        ahead = ((damaged >> 3) - seq + YOUNG) % 8192
-        if (damaged & 7).bit_count() <= 1 and ahead <= 2 * YOUNG:
+        ahead = ((damaged >> 3) - seq + AGE_MAX_PERIODS) % 8192
+        if (damaged & 7).bit_count() <= 1 and ahead <= 2 * AGE_MAX_PERIODS:
             return True
     return False
 

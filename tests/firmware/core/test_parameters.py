@@ -3,7 +3,7 @@ import pytest
 from tests.firmware.bench import CONFIG, SESSION, Bench, Core
 
 OK, UNKNOWN, READ_ONLY, OUT_OF_RANGE, NOT_IDLE, NOT_OWNER = range(6)
-TOP = (1 << 31) - 1
+VALUE_MAX = (1 << 31) - 1
 BUILT = {
     1: CONFIG["board"],
     2: 7,
@@ -24,7 +24,7 @@ BUILT = {
 }
 RANGES = {
     7: (1, 10000),
-    8: (1, TOP),
+    8: (1, VALUE_MAX),
     9: (5, 20),
     10: (1, 40000),
     11: (1, 20000),
@@ -57,8 +57,8 @@ def test_the_range(core: Core, number: int) -> None:
     for value in [high, low]:
         assert _set(bench, number, value) == (OK, value)
         assert bench.ask("PARAMETER_GET", id=number)["value"] == value
-        for outside in [low - 1, high + 1, -(1 << 31), TOP]:
-            if -(1 << 31) <= outside <= TOP and not low <= outside <= high:
+        for outside in [low - 1, high + 1, -(1 << 31), VALUE_MAX]:
+            if -(1 << 31) <= outside <= VALUE_MAX and not low <= outside <= high:
                 assert _set(bench, number, outside) == (OUT_OF_RANGE, value)
 
 
@@ -76,7 +76,7 @@ def test_the_watchdog_s_time_can_be_lowered_only(core: Core, built: int) -> None
     """For any requested time, 0 V comes within what the board was built with and a tick."""
     bench = Bench(core, watchdog_ms=built)
     bench.hello()
-    for asked in (built + 1, 50, 51, TOP):
+    for asked in (built + 1, 50, 51, VALUE_MAX):
         assert asked <= built or _set(bench, 9, asked) == (OUT_OF_RANGE, built)
     assert _set(bench, 9, 5) == (OK, 5)
     assert _set(bench, 9, built) == (OK, built)
@@ -163,13 +163,13 @@ def test_lowered_limits_hold(core: Core) -> None:
 LIMITS = {
     "period_us": (50, 100000),
     "voltage_limit_mV": (1, 32767),
-    "slew_mV_per_ms": (0, TOP),
+    "slew_mV_per_ms": (0, VALUE_MAX),
     "watchdog_ms": (5, 50),
-    "speed_limit_counts_s": (1, TOP),
-    "travel_limit_counts": (1, TOP),
-    "supply_mV": (0, TOP),
+    "speed_limit_counts_s": (1, VALUE_MAX),
+    "travel_limit_counts": (1, VALUE_MAX),
+    "supply_mV": (0, VALUE_MAX),
     "node": (0, 15),
-    "counts_per_rev": (1, TOP),
+    "counts_per_rev": (1, VALUE_MAX),
 }
 
 
@@ -179,7 +179,7 @@ def test_a_configuration_outside_its_ranges(core: Core, field: str) -> None:
     for fine in (low, high):
         assert Bench(core, boot=False, **{field: fine}).valid
     for wrong in (low - 1, high + 1):
-        if wrong > TOP or (field == "node" and wrong < 0):
+        if wrong > VALUE_MAX or (field == "node" and wrong < 0):
             continue
         bench = Bench(core, boot=False, **{field: wrong})
         assert not bench.valid

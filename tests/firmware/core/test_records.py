@@ -10,7 +10,7 @@ from fastcrc import crc16
 from tests.firmware.bench import CONFIG, Core
 from tools.record import RECORD_BYTES, RecordLink, record
 
-PLACES = 204
+PLACE_COUNT = 204
 BLANK = b"\xff" * RECORD_BYTES
 
 
@@ -109,8 +109,8 @@ def test_sector_that_was_half_blanked_is_blanked_again(core: Core) -> None:
 
 
 def test_full_flash_of_the_board_holds_so_many(core: Core) -> None:
-    assert 16 * 1024 // RECORD_BYTES == PLACES
-    sectors = [[numbered(n) for n in range(1, PLACES + 1)], [BLANK] * PLACES]
+    assert 16 * 1024 // RECORD_BYTES == PLACE_COUNT
+    sectors = [[numbered(n) for n in range(1, PLACE_COUNT + 1)], [BLANK] * PLACE_COUNT]
     assert Store(core, *sectors).next() == (1, 0, True)
 
 

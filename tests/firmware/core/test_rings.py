@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 if TYPE_CHECKING:
     from tests.firmware.bench import Core
 
-ROOM = 1024
+RING_BYTES = 1024
 MOVES = st.lists(st.tuples(st.booleans(), st.integers(0, 700)), max_size=40)
 
 
@@ -34,11 +34,11 @@ def test_ring_keeps_order_and_loses_nothing(core: Core, start: int) -> None:
         held: deque[int] = deque()
         number = 0
         for puts, length in moves:
-            assert core.lib.ring_room(ring) == ROOM - len(held)
+            assert core.lib.ring_room(ring) == RING_BYTES - len(held)
             assert core.lib.ring_is_empty(ring) is not bool(held)
             if puts:
                 data = bytes((number + i) % 251 for i in range(length))
-                fits = length <= ROOM - len(held)
+                fits = length <= RING_BYTES - len(held)
                 assert put(core, ring, data) is fits
                 held.extend(data if fits else b"")
                 number += length

@@ -3,7 +3,7 @@ import pytest
 from tests.firmware.bench import Bench, Core
 
 IDLE, RUN, FAULT = 1, 3, 4
-LEASE = 500_000
+LEASE_US = 500_000
 
 
 def test_hello(core: Core) -> None:
@@ -52,7 +52,7 @@ def test_lease(core: Core, start: int, renewal: str) -> None:
     bench = Bench(core, start=start)
     bench.hello()
     for _ in range(3):
-        bench.advance(LEASE - 1)
+        bench.advance(LEASE_US - 1)
         assert bench.hello(9)["busy"] == 1
         if renewal == "HELLO":
             bench.hello()
@@ -61,7 +61,7 @@ def test_lease(core: Core, start: int, renewal: str) -> None:
             assert bench.drive(arm=0)
         else:
             assert bench.ask("PARAMETER_SET", session=0x1234, id=1, value=0)["result"] == 2
-    bench.advance(LEASE)
+    bench.advance(LEASE_US)
     assert bench.hello(9)["owned"] == 1
 
 
@@ -93,7 +93,7 @@ def test_what_does_not_renew_a_lease(core: Core) -> None:
 def test_no_lease_ends_in_run(core: Core) -> None:
     bench = Bench(core)
     bench.arm()
-    bench.device.session.heard_us = (bench.now - 2 * LEASE) % (1 << 32)
+    bench.device.session.heard_us = (bench.now - 2 * LEASE_US) % (1 << 32)
     bench.tick()
     assert bench.state == RUN
     assert bench.hello(9)["busy"] == 1
@@ -114,7 +114,7 @@ def test_no_owner_has_no_lease_and_asks_for_none(core: Core) -> None:
     session = core.new("struct dcmp_session *")
     for owner in (0, 1, 0xFFFF):
         session.owner = owner
-        assert core.lib.dcmp_session_lapsed(session, LEASE) is (owner != 0)
+        assert core.lib.dcmp_session_lapsed(session, LEASE_US) is (owner != 0)
         session.owner = 0
         assert core.lib.dcmp_session_ask(session, owner, 0) is (owner != 0)
 

@@ -5,10 +5,10 @@ import pytest
 from tests.firmware.bench import Bench, Core
 
 RUN, FAULT = 3, 4
-PERIODS = [100, 250, 1000, 1700, 3000]
+PERIODS_US = [100, 250, 1000, 1700, 3000]
 
 
-@pytest.mark.parametrize("period", PERIODS)
+@pytest.mark.parametrize("period", PERIODS_US)
 @pytest.mark.parametrize("start", [0, 0xFFFF0000, 0xFFFFFFFF, 0x7FFFF000])
 def test_silence_ends_in_zero_volts(core: Core, period: int, start: int) -> None:
     """After the watchdog's time and at most one tick, for any phase of the host."""

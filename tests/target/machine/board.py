@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Truth
     from tests.target.machine.ports import Frame
 
-_BOARD = 3
+_BOARD_NUMBER = 3
 _DAC_MV = 10_000
 _SAID_US = 600.0  # by then it has said what there is to say of a tick
-_SIGN = 1 << 31
+_SIGN_BIT = 1 << 31
 
 
 class TargetBoard:
@@ -40,7 +40,7 @@ class TargetBoard:
 
     def __init__(self, elf: Path, rig: Rig, carrier: str = "cobs", **options: object) -> None:
         kept = record(
-            board_config(rig, _BOARD),
+            board_config(rig, _BOARD_NUMBER),
             link=RecordLink[carrier],
             full_scale_mV=rig.amplifier.supply_mV or _DAC_MV,
         )
@@ -63,7 +63,7 @@ class TargetBoard:
         if self.ticks > 1:
             self.pins.advance(round(self.system.amplifier_mV))
         count = self.pins.count() if self.turned is None else self.turned(now)
-        return count - 2 * (count & _SIGN)
+        return count - 2 * (count & _SIGN_BIT)
 
     def tick(self) -> None:
         """Let the next tick come, and what follows from it."""

@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 import zipfile
 from typing import NamedTuple
 
-_WORD = 0xFFFF_FFFF
+_UINT32_MAX = 0xFFFF_FFFF
 _F405 = {("GPIOA", "MODER"): 0xA800_0000, ("CAN1", "ESR"): 0, ("FLASH", "CR"): 0x8000_0000}
 """Reset values in RM0090 that the description of the F429 has otherwise."""
 _BY_HARDWARE = {"IDR", "SR", "CNT", "CCR1", "CCR2", "CCR3", "CCR4", "CSR", "CIR"}
@@ -59,6 +59,6 @@ def description() -> dict[str, tuple[int, dict[int, Register]]]:
             reset = _F405.get((name, label), int(register.findtext("resetValue", "0"), 16))
             offset = _number(register.findtext("addressOffset"))
             read_only = register.findtext("access") == "read-only"
-            registers.setdefault(offset, Register(label, reset & _WORD, _mask(register), read_only))
+            registers.setdefault(offset, Register(label, reset & _UINT32_MAX, _mask(register), read_only))
         found[name] = (_number(element.findtext("baseAddress")), registers)
     return found

@@ -36,7 +36,7 @@ _EMULATOR: Any = unicorn  # its functions have no types
 STACK_TOP_OF_BOARD = 0x2000_1000
 _WFI = b"\x30\xbf"
 _RETURNS = 8  # unicorn's number for the end of an exception
-_SLICE = 2000  # instructions at most between two checks of the time
+_SLICE_INSTRUCTIONS = 2000  # instructions at most between two checks of the time
 
 
 class System:

@@ -9,7 +9,7 @@ from tests.target.machine.block import Block
 if TYPE_CHECKING:
     from tests.target.machine.system import System
 
-_WORD = 0xFFFF_FFFF
+_UINT32_MAX = 0xFFFF_FFFF
 _IRQ = {"TIM3": 29, "TIM5": 50, "TIM2": 28}
 _WIDE = ("TIM2", "TIM5")
 TRGO_OF = {("TIM2", 2): "TIM3", ("TIM5", 0): "TIM2", ("TIM2", 0): "TIM1", ("TIM5", 1): "TIM3"}
@@ -28,7 +28,7 @@ class Timer(Block):
     def reset(self) -> None:
         """Stop the timer."""
         super().reset()
-        self.now["ARR"] = _WORD if self.name in _WIDE else 0xFFFF
+        self.now["ARR"] = _UINT32_MAX if self.name in _WIDE else 0xFFFF
         self._prescaler = 0  # in use; PSC comes in at an update
         self._since_us, self._from = 0.0, 0
         self._round = 0
@@ -97,7 +97,7 @@ class Timer(Block):
 
     def capture(self, channel: int, value: int) -> None:
         """Take a value into a channel."""
-        self.now[f"CCR{channel}"] = value & _WORD
+        self.now[f"CCR{channel}"] = value & _UINT32_MAX
         if self.flag("SR", channel):
             self.raise_flag("SR", 8 + channel)
         self.raise_flag("SR", channel)
@@ -140,7 +140,7 @@ class EncoderTimer(Timer):
 
     def count(self) -> int:
         """Return the count of encoder edges."""
-        return self._count & _WORD if self.field("SMCR", 0, 3) else super().count()
+        return self._count & _UINT32_MAX if self.field("SMCR", 0, 3) else super().count()
 
     def turn(self, to: int) -> None:
         """Let the encoder come to this count of its own, edge by edge."""
