@@ -53,10 +53,10 @@ def test_ring_keeps_order_and_loses_nothing(core: Core, start: int) -> None:
 def test_ring_filled_to_its_last_byte_keeps_its_oldest(core: Core, start: int) -> None:
     ring = core.new("struct ring *")
     ring.written = ring.read = start
-    oldest, rest = bytes(range(1, 101)), bytes(200 for _ in range(ROOM - 100))
+    oldest, rest = bytes(range(1, 101)), bytes(200 for _ in range(RING_BYTES - 100))
     assert put(core, ring, oldest)
     beyond = rest + b"\x99"  # the byte behind those to put stands where a byte too many would come from
     assert core.lib.ring_put(ring, beyond, len(rest))
     assert core.lib.ring_room(ring) == 0
     assert not put(core, ring, b"\x01")
-    assert take(core, ring, ROOM + 1) == oldest + rest
+    assert take(core, ring, RING_BYTES + 1) == oldest + rest
