@@ -47,7 +47,7 @@ class Host:
 
         def found() -> list[int]:
             pids = [int(pid) for pid in children.read_text().split()]
-            return [pid for pid in pids if b"telemetry.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+            return [pid for pid in pids if b"telemetry_worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
         until(lambda: any(self.folder.glob("runs/*/run.mcap")) and bool(found()), "telemetry records")
         return found()[0]
