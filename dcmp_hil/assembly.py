@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.stage_factory import controller_of, observer_of
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import controllers, observers
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
@@ -17,9 +18,6 @@ from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.live.live_changes import LiveChanges, NoChanges
 from dcmp_hil.loop import LoopStages
-from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
-from dcmp_hil.plugins.named_class import make_named
-from dcmp_hil.plugins.roles import CONTROLLER, OBSERVER
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.limiter import Limiter
@@ -41,7 +39,6 @@ if TYPE_CHECKING:
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest
-    from dcmp_hil.plugins.roles import Role
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
     from dcmp_hil.trip_request import Check
@@ -122,11 +119,7 @@ def assemble(
 def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
     """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
     context = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
-    observer: Observer = (
-        CheckedObserver(_make_custom(rig, rig.observer, OBSERVER, context), rig.observer.kind)
-        if isinstance(rig.observer, Custom)
-        else rig.observer.build(context)
-    )
+    observer = observer_of(rig.observer, context, rig.plugin_folders)
     if isinstance(rig.controller, PdSettings) and rig.controller.friction_feedforward:
         return KnownFriction(observer, context, trajectory.at, rig.delay)
     return observer
@@ -135,9 +128,7 @@ def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
 def make_controller(rig: Rig) -> Controller:
     """Make the controller that `[controller]` asks for."""
     context = controllers.ControllerContext(rig.model.values(), rig.period)
-    if isinstance(rig.controller, Custom):
-        return CheckedController(_make_custom(rig, rig.controller, CONTROLLER, context), rig.controller.kind)
-    return rig.controller.build(context)
+    return controller_of(rig.controller, context, rig.plugin_folders)
 
 
 def make_supervisor(
@@ -208,7 +199,3 @@ def make_outlier_filter(rig: Rig) -> OutlierFilter:
     limits = rig.supervisor
     fastest = limits.velocity_limit_rad_s if limits.monitors == "all" else math.inf
     return OutlierFilter(fastest, rig.period, rig.encoder.count)
-
-
-def _make_custom(rig: Rig, section: Custom, role: Role, context: object) -> Any:
-    return make_named(section.kind, role, rig.plugin_folders, (context,), section.options)

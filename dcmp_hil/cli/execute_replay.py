@@ -119,7 +119,7 @@ def _table(file: Path, settings: ReplaySettings, result: ReplayResult) -> Table:
     figures = result.figures
     first, last = figures.window_s
     table = Table(
-        title=Text(f"{file.name}: {settings.observer}, {first:.2f} to {last:.2f} s"),
+        title=Text(f"{file.name}: {settings.kind}, {first:.2f} to {last:.2f} s"),
         title_justify="left",
         show_header=False,
         box=None,

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.config import load_rig, load_table
-from dcmp_hil.config.sections import Custom
-from dcmp_hil.control.observers.paper import PaperSettings
-from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
+from dcmp_hil.config import load_tables
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.config import Rig
+    from dcmp_hil.config.tables import RigTables
 
 IDEAL = "ideal"
 _OPTION_KEYS = {  # short options for keys of a rig
@@ -30,8 +27,7 @@ _OPTION_KEYS = {  # short options for keys of a rig
     "f0": "model.f0_1_s",
     "ku": "model.ku_rad_s2_V",
 }
-_OF_A_FILE = ("observer", "model", "encoder")
-_NO_RIG_TABLES = {"loop": {"rate_hz": 20_000.0}}  # the rate bounds mu0, and that of the recording is another
+_FILE_TABLES = ("observer", "model", "encoder")
 
 
 @dataclass(frozen=True)
@@ -67,12 +63,10 @@ class Given:
         Raises
         ------
         ConfigError
-            If one key is given twice.
+            If one key is given twice, or a number is beyond its option's range.
         """
-        gains = {**self.gains, "observer": _kind(self.gains.get("observer"))}
-        short = tuple(f"{_OPTION_KEYS[name]}={_toml(value)}" for name, value in _set(gains).items())
-        keys = [override.partition("=")[0].strip() for override in self.overrides]
-        twice = [option for option, key in _OPTION_KEYS.items() if key in keys and option in _set(self.gains)]
+        written = [override.partition("=")[0].strip() for override in self.overrides]
+        twice = [option for option in _set(self.gains) if _OPTION_KEYS[option] in written]
         if twice:
             raise ConfigError(
                 *(
@@ -80,7 +74,10 @@ class Given:
                     for option in twice
                 )
             )
-        return short + self.overrides
+        gains = _set({**self.gains, "observer": _kind(self.gains.get("observer"))})
+        numbers = _set({"inertia": self.encoder.get("inertia"), "cutoff": self.figures.get("cutoff")})
+        _ = ReplaySettings(**gains, **numbers).section  # its faults name the short options, every one at once
+        return (*(f"{_OPTION_KEYS[name]}={_toml(value)}" for name, value in gains.items()), *self.overrides)
 
     def refused_of_a_run(self) -> list[str]:
         """Return the options that were given and mean nothing for a run's own recording."""
@@ -102,15 +99,11 @@ class Given:
                 f"--period: got {period:g} s, expected a number of at least 1e-06 and of at most 10. Give "
                 "the time from row to row in seconds, or leave it out to take the stamps."
             )
-        ku = self.gains.get("ku")
+        ku = any(key.partition("=")[0].strip() == _OPTION_KEYS["ku"] for key in self.keys())
         return ColumnOptions(
             **self.columns,
             no_input=bool(self.file.get("no_input")),
-            prefer="torque"
-            if self.encoder.get("inertia") is not None
-            else "voltage"
-            if ku is not None
-            else None,
+            prefer="torque" if self.encoder.get("inertia") is not None else "voltage" if ku else None,
             counts_per_rev=None if counts == IDEAL else counts,
             period=period,
             modulus=_modulus(self.file.get("modulus")),
@@ -124,48 +117,32 @@ class Given:
         ConfigError
             With every value that is out of range, or a key that a file has not.
         """
-        from_rig = self._from_rig()
-        kind = _kind(self.gains.get("observer"))
-        if kind is not None:
-            from_rig["observer"] = kind
         input_at = self.file.get("input_at")
         options = {
             "input_at": None if input_at is None else str(input_at),
             "counts_per_rev": self._counts(),
             "period": self.file.get("period"),
             "inertia": self.encoder.get("inertia"),
-            **{name: value for name, value in self.gains.items() if name != "observer"},
             **self.figures,
         }
-        return ReplaySettings(**{**from_rig, **_set(options)})
+        return ReplaySettings(**{**self._from_tables, **_set(options)})
 
-    def _from_rig(self) -> dict[str, Any]:
-        """Return what `--rig` and `--set` say, in the words of `ReplaySettings`."""
-        self.keys()
+    @cached_property
+    def _from_tables(self) -> dict[str, Any]:
+        """Return what `--rig`, `--set` and the short options say, in the words of `ReplaySettings`."""
         for override in self.overrides:
-            if override.partition(".")[0] not in _OF_A_FILE:
+            if override.partition(".")[0] not in _FILE_TABLES:
                 raise ConfigError(
                     f"--set {override}: what was measured stays as it was; of a recording by another program "
                     "only keys of observer, model and encoder.counts_per_rev can be set."
                 )
         source = self.encoder.get("rig")
-        if source is None and not self.overrides:
-            return {}
-        overrides = self.overrides
-        kind = _kind(self.gains.get("observer"))
-        if kind is not None:
-            overrides = (f"observer.kind={_toml(kind)}", *overrides)
-        rig = (
-            load_table(deepcopy(_NO_RIG_TABLES), overrides) if source is None else load_rig(source, overrides)
-        )
-        return _settings_of(rig, named=source is not None)
+        return _settings_of(load_tables(source, self.keys()), named=source is not None)
 
     def _counts(self) -> Any:
         text = self.encoder.get("counts_per_rev")
         if text is None:
-            return (
-                self._from_rig().get("counts_per_rev") if self.encoder.get("rig") or self.overrides else None
-            )
+            return self._from_tables.get("counts_per_rev")
         if text.lower() == IDEAL:
             return IDEAL
         try:
@@ -176,25 +153,14 @@ class Given:
             ) from None
 
 
-def _settings_of(rig: Rig, *, named: bool) -> dict[str, Any]:
+def _settings_of(rig: RigTables, *, named: bool) -> dict[str, Any]:
     """Return a rig's observer, model and encoder as keys of `ReplaySettings`."""
-    found: dict[str, Any] = {"model": rig.model.values(), "observer": rig.observer.kind}
+    folders = tuple(dict.fromkeys((*rig.plugin_folders, Path())))
+    found: dict[str, Any] = {"model": rig.model.values(), "observer": rig.observer, "folders": folders}
     if named or "ku_rad_s2_V" in rig.model.model_fields_set:
         found["ku"] = rig.model.ku_rad_s2_V
     if named or "counts_per_rev" in rig.encoder.model_fields_set:
         found["counts_per_rev"] = rig.encoder.counts_per_rev
-    section = rig.observer
-    if isinstance(section, Custom):
-        return {
-            **found,
-            "observer_options": dict(section.options),
-            "folders": tuple(dict.fromkeys((*rig.plugin_folders, Path()))),
-        }
-    found |= {"L1": section.L1_1_s, "L2": section.L2_1_s2, "M": section.M_rad_s3}
-    if isinstance(section, SuperTwistingSettings):
-        found["mu0"] = section.mu0_rad_s
-    if isinstance(section, PaperSettings):
-        found["from_zero"] = section.start == "zero"
     return found
 
 

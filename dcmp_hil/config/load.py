@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from dcmp_hil.config.formatting import printable, toml_value
 from dcmp_hil.config.overrides import apply_overrides
-from dcmp_hil.config.rig import Rig
+from dcmp_hil.config.rig import OpenLoopTables, Rig
 from dcmp_hil.config.toml_text import name_from, parse
 from dcmp_hil.config.validation_errors import explain_faults
 from dcmp_hil.control.references.table import Table
@@ -20,6 +20,8 @@ from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
+
+    from dcmp_hil.config.tables import RigTables
 
 _RIGS_FOLDER = resources.files("dcmp_hil").joinpath("rigs")
 _FILE_BYTES_MAX = 128 * 1024  # bytes: no rig is that long
@@ -79,6 +81,36 @@ def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: 
         return rig
     rig = _with_reference_file(rig, folder, place, set_keys)
     return rig if folder == Path() else rig.in_folder(folder.absolute())
+
+
+def load_tables(source: str | Path | None, overrides: Sequence[str] = ()) -> RigTables:
+    """Read the tables of a rig for a computation that closes no loop; see `load_rig`.
+
+    The rules that ask for a loop, such as its stability, do not apply; the bounds of each key do. No file of
+    a reference is read.
+
+    Parameters
+    ----------
+    source
+        As for `load_rig`; None for the defaults.
+    overrides
+        As for `load_rig`.
+
+    Raises
+    ------
+    ConfigError
+        With every fault found.
+    """
+    text, place, folder = ("", "the defaults", Path()) if source is None else _read(source)
+    table = parse(text, place)
+    if source is not None:
+        table.setdefault("name", name_from(Path(place).stem))
+    set_keys = apply_overrides(table, overrides)
+    try:
+        tables = OpenLoopTables.model_validate(table)
+    except ValidationError as error:
+        raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
+    return tables if folder == Path() else tables.in_folder(folder.absolute())
 
 
 def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any, Self, get_args
 
 from pydantic import Discriminator, model_validator
 
-from dcmp_hil.config.rules import RULES
+from dcmp_hil.config.rules import OPEN_LOOP_RULES, RULES
 from dcmp_hil.config.tables import RigTables
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from dcmp_hil.common.section import Section
 
 
@@ -18,10 +20,23 @@ class Rig(RigTables):
 
     @model_validator(mode="after")
     def _check_rules(self) -> Self:
-        faults = [fault for rule in RULES if (fault := rule(self))]
-        if faults:
-            raise ValueError("\n".join(faults))
+        _check(self, RULES)
         return self
+
+
+class OpenLoopTables(RigTables):
+    """Settings of one rig for a computation that closes no loop, such as an observer over a recording."""
+
+    @model_validator(mode="after")
+    def _check_rules(self) -> Self:
+        _check(self, OPEN_LOOP_RULES)
+        return self
+
+
+def _check(tables: RigTables, rules: Iterable[Callable[[RigTables], str]]) -> None:
+    faults = [fault for rule in rules if (fault := rule(tables))]
+    if faults:
+        raise ValueError("\n".join(faults))
 
 
 def _kinds(union: Any) -> dict[str, type[Section]]:

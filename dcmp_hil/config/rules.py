@@ -254,3 +254,5 @@ RULES: tuple[Callable[[RigTables], str], ...] = (
     gains_hold,
 )
 """Each returns its faults, one a line, beginning with the key; empty if there is none."""
+OPEN_LOOP_RULES = (_within_reason,)
+"""Those of them that hold where no loop is closed."""

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.config.stage_factory import observer_of
 from dcmp_hil.control.model import Model
 from dcmp_hil.control.observers import ObserverContext
-from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.resolution import equivalent_counts_per_rev, estimate_counts_per_rev
 from dcmp_hil.offline.settings import IDEAL, ReplaySettings
-from dcmp_hil.plugins.checked import CheckedObserver
-from dcmp_hil.plugins.named_class import find_named, make
-from dcmp_hil.plugins.roles import OBSERVER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +23,6 @@ if TYPE_CHECKING:
 
 _PERIOD_MIN_S = 1e-6  # s: a shorter period is a wrong unit
 _USUAL_COUNTS = 4096.0  # where the recording tells nothing
-_PAPER_M_RAD_S3 = 1000.0  # rad/s3
 
 
 class Preparation(NamedTuple):
@@ -66,7 +62,7 @@ def prepare(recording: LoggedSignals, settings: ReplaySettings) -> Preparation:
     counts, how = _resolution(recording, settings)
     notes = why + how
     setting = ObserverContext(settings.model._replace(f0=settings.friction, ku=ku), period, counts)
-    observer = _make(settings, setting)
+    observer = observer_of(settings.section, setting, settings.folders, "--observer")
     if isinstance(observer, SuperTwisting) and observer.mu0 * period > 0.3 + 1e-9:
         most = 0.3 / period
         notes += (f"mu0 = {observer.mu0:g} rad/s is more than the rule ever takes here ({most:.3g} rad/s).",)
@@ -120,18 +116,6 @@ def _resolution(recording: LoggedSignals, settings: ReplaySettings) -> tuple[flo
     if counts is None:
         counts, why = _USUAL_COUNTS, "assumed, since the position hardly changes"
     return counts, (f"Counts per revolution: {counts:.0f} ({why}). --counts-per-rev overrides it.",)
-
-
-def _make(settings: ReplaySettings, setting: ObserverContext) -> Observer:
-    if settings.observer == "super_twisting":
-        return SuperTwisting(setting, L1=settings.L1, L2=settings.L2, M=settings.M, mu0=settings.mu0)
-    if settings.observer == "paper":
-        M = _PAPER_M_RAD_S3 if settings.M is None else settings.M
-        return PaperObserver(setting, L1=settings.L1, L2=settings.L2, M=M, from_zero=settings.from_zero)
-    find = find_named(settings.observer, "--observer", ("super_twisting", "paper"), settings.folders)
-    role = OBSERVER._replace(key="--observer")
-    made = make(find, settings.observer, role, (setting,), settings.observer_options)
-    return CheckedObserver(made, settings.observer)
 
 
 def _over_the_step_before(values: NDArray[np.float64], settings: ReplaySettings) -> NDArray[np.float64]:

@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.plugins.named_class import split_named
+
+if TYPE_CHECKING:
+    from dcmp_hil.config.tables import ObserverSection
 
 InputKind = Literal["torque", "voltage", "none"]
 _PAPER_MODEL = Model()
@@ -27,8 +33,9 @@ class ReplaySettings:
         If a value is out of range; names every one that is.
     """
 
-    observer: str = "super_twisting"
-    """`super_twisting` (R1), `paper` (R0), or `module:Class`, made as Class(context, **observer_options)."""
+    observer: str | ObserverSection = "super_twisting"
+    """A kind that `[observer]` takes, such as `super_twisting` (R1) or `paper` (R0); or `module:Class`, made
+    as Class(context, **observer_options); or the table itself, which then says what the gains below say."""
     observer_options: dict[str, Any] = field(default_factory=dict)
     """What `module:Class` is made with, by keyword."""
     folders: tuple[Path, ...] = (_CURRENT_FOLDER,)
@@ -73,7 +80,7 @@ class ReplaySettings:
             faults.append(f'--input-at: got "{self.input_at}". Write start (row k-1) or end (row k).')
         if self.mu0 is not None and self.observer == "paper":
             faults.append("--mu0: the paper's observer has no bandwidth floor. Leave the option out.")
-        if self.observer_options and ":" not in self.observer:
+        if self.observer_options and isinstance(self.observer, str) and ":" not in self.observer:
             faults.append("observer.options: only an observer of your own (module:Class) takes them.")
         if faults:
             raise ConfigError(*faults)
@@ -82,6 +89,38 @@ class ReplaySettings:
     def friction(self) -> float:
         """Return f0, 1/s."""
         return self.model.f0 if self.f0 is None else self.f0
+
+    @property
+    def kind(self) -> str:
+        """Return the observer's name."""
+        return self.observer if isinstance(self.observer, str) else self.observer.kind
+
+    @property
+    def section(self) -> ObserverSection:
+        """Return the table of the observer: `[observer]` with the gains that are set.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such kind.
+        """
+        if not isinstance(self.observer, str):
+            return self.observer
+        known = {kind: table for kind, table in KINDS["observer"].items() if kind != "custom"}
+        if self.observer not in known:
+            split_named(self.observer, "--observer", known)
+            return Custom.model_construct(kind=self.observer, options=self.observer_options)
+        table = known[self.observer]
+        start = "zero" if self.from_zero else "measured"
+        gains = {
+            "L1_1_s": self.L1,
+            "L2_1_s2": self.L2,
+            "M_rad_s3": self.M,
+            "mu0_rad_s": self.mu0,
+            "start": start,
+        }
+        keys = {key: value for key, value in gains.items() if key in table.model_fields and value is not None}
+        return cast("ObserverSection", table.model_validate({"kind": self.observer, **keys}))
 
     def _ranges(self) -> list[tuple[str, float, str, float, float, bool, str]]:
         """Of those that are set: option, value, unit, least, most, whether the least is out, remedy."""

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from dcmp_hil import load_rig
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.errors import ConfigError
+from dcmp_hil.offline import ReplaySettings, read_recording, replay
 from tests.helpers import named
 from tests.offline.synthetic import swing, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from dcmp_hil import ObserverContext
     from dcmp_hil.values import Estimate, Sample
@@ -72,6 +76,25 @@ def test_an_observer_of_one_s_own_is_told_what_options_and_rig_say(
     assert by_both.model[:4] == (0.1, 0.75, 7.0, 2.5)
     assert [context.counts_per_rev for context, _ in MADE][2:] == [2156.0, 1000.0]
     assert [options for _, options in MADE] == [{}, {}, {"gain": 3.0}, {"gain": 3.0}]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS["observer"] if kind != "custom"])
+def test_every_observer_of_a_rig_runs_over_a_file(kind: str, cli: Cli, recording: str) -> None:
+    by_name = figures(cli, recording, "--observer", kind)
+    assert by_name == figures(cli, recording, "--set", f"observer.kind={kind}")
+    settings = ReplaySettings(observer=kind)
+    assert settings.section == KINDS["observer"][kind].model_validate({"kind": kind})
+    of_table = replay(read_recording(Path(recording)), ReplaySettings(observer=settings.section))
+    of_name = replay(read_recording(Path(recording)), settings)
+    assert of_table.figures == of_name.figures
+    assert of_name.figures.velocity_error_rms_rad_s == by_name["velocity_error_rms_rad_s"]
+
+
+@pytest.mark.parametrize("key", ["observer.mu0_rad_s=2000", "observer.L1_1_s=9000"])
+def test_rules_of_a_loop_do_not_apply_where_none_is_closed(key: str, cli: Cli, recording: str) -> None:
+    with pytest.raises(ConfigError):
+        load_rig("bench-1khz", [key])
+    assert figures(cli, recording, "--set", key)["rows"] > 100
 
 
 @pytest.mark.parametrize(
