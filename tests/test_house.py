@@ -94,6 +94,11 @@ def test_a_class_has_a_name_of_its_own() -> None:
     assert {name for name, count in Counter(classes).items() if count > 1} == set()
 
 
+def test_one_module_looks_for_similar_names() -> None:
+    users = {name for name, tree in _modules().items() if "difflib" in _imports_of(tree)}
+    assert users == {"dcmp_hil.common.similar_names"}
+
+
 def test_no_heavy_library_stands_behind_the_loop_not_even_in_a_function() -> None:
     reached, ahead = set[str](), {"dcmp_hil.loop"}
     while ahead:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dcmp_hil.config import load_tables
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
+from dcmp_hil.offline.settings import PERIOD_RANGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -94,10 +95,10 @@ class Given:
         """
         counts = self._counts()
         period = self.file.get("period")
-        if period is not None and not 1e-6 <= period <= 10.0:  # noqa: PLR2004 - as ReplaySettings
+        if period is not None and not PERIOD_RANGE.holds(period):
             raise ConfigError(
-                f"--period: got {period:g} s, expected a number of at least 1e-06 and of at most 10. Give "
-                "the time from row to row in seconds, or leave it out to take the stamps."
+                f"--period: got {period:g}; expected {PERIOD_RANGE.words('s')}. Give the time from row to "
+                "row, or leave it out to take the stamps."
             )
         ku = any(key.partition("=")[0].strip() == _OPTION_KEYS["ku"] for key in self.keys())
         return ColumnOptions(

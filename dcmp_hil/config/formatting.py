@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, Any
+
+from dcmp_hil.common.number_range import NumberRange, number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 _SHOWN_CHARS_MAX = 60  # characters of a key or a value that are shown
-_PLAIN_NUMBER_MAX = 1e15  # beyond it a float no longer holds every whole number
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 _TYPE_NAMES = {
     "number": "a number",
@@ -17,15 +19,6 @@ _TYPE_NAMES = {
     "boolean": "true or false",
     "string": "text",
 }
-
-
-def number(value: float) -> str:
-    """Write a number so that it reads back as the same one."""
-    short = f"{value:g}"
-    if "e" not in short and float(short) == value:
-        return short
-    whole = abs(value) < _PLAIN_NUMBER_MAX and value == int(value)
-    return str(int(value)) if whole else repr(value)
 
 
 def toml_value(value: Any) -> str:
@@ -65,18 +58,17 @@ def describe(schema: Mapping[str, Any]) -> str:
         return "0 or 1"
     examples = schema.get("examples")
     such_as = f" such as {toml_value(examples[0])}" if examples else ""
-    return f"{_TYPE_NAMES.get(str(schema.get('type')), 'a table')}{_bounds(schema)}{such_as}"
+    return f"{range_of(schema).words(what=_TYPE_NAMES.get(str(schema.get('type')), 'a table'))}{such_as}"
 
 
-def _bounds(schema: Mapping[str, Any]) -> str:
-    words = {
-        "minimum": "at least",
-        "exclusiveMinimum": "above",
-        "maximum": "at most",
-        "exclusiveMaximum": "below",
-    }
-    parts = [f"{word} {number(schema[bound])}" for bound, word in words.items() if bound in schema]
-    return f", {' and '.join(parts)}" if parts else ""
+def range_of(schema: Mapping[str, Any]) -> NumberRange:
+    """Return the bounds that a JSON schema of one number gives."""
+    return NumberRange(
+        float(schema.get("exclusiveMinimum", schema.get("minimum", -math.inf))),
+        float(schema.get("exclusiveMaximum", schema.get("maximum", math.inf))),
+        low_excluded="exclusiveMinimum" in schema,
+        high_excluded="exclusiveMaximum" in schema,
+    )
 
 
 def printable(text: str) -> str:

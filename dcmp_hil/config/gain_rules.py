@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.config.formatting import number
+from dcmp_hil.common.number_range import number
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers import ObserverContext
 from dcmp_hil.control.observers.paper import PaperSettings

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
+from dcmp_hil.common.similar_names import did_you_mean
 from dcmp_hil.config.formatting import printable, toml_value
 from dcmp_hil.config.overrides import apply_overrides
 from dcmp_hil.config.rig import OpenLoopTables, Rig
@@ -204,10 +204,9 @@ def shipped_text(name: str) -> str:
     """
     known = shipped_rigs()
     if name not in known:
-        close = get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f'Did you mean "{close[0]}"? ' if close else ""
+        hint = did_you_mean(name, known, cutoff=0.5)
         raise ConfigError(
-            f"{toml_value(name)} is no shipped rig. {hint}There are: {', '.join(known)}; "
+            f"{toml_value(name)} is no shipped rig. {hint}{hint and ' '}There are: {', '.join(known)}; "
             "a file of your own ends in .toml."
         )
     return _RIGS_FOLDER.joinpath(f"{name}.toml").read_text("utf-8")

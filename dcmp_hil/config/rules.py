@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dcmp_hil.config.formatting import number
+from dcmp_hil.common.number_range import NumberRange, number
 from dcmp_hil.config.gain_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.control.observers.super_twisting import bandwidth_floor
@@ -228,13 +228,14 @@ def _beyond_reason(name: str, section: Section) -> Iterator[str]:
         if not isinstance(value, float) or unit not in _PLAUSIBLE_MAX:
             continue
         above_zero = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
-        low, high = (_POSITIVE_MIN if above_zero else -_PLAUSIBLE_MAX[unit]), _PLAUSIBLE_MAX[unit]
-        if low <= value <= high:
+        largest = _PLAUSIBLE_MAX[unit]
+        allowed = NumberRange(_POSITIVE_MIN if above_zero else -largest, largest)
+        if allowed.holds(value):
             continue
-        at_least, at_most = f"at least {number(low)}", f"at most {number(high)}"
-        bounds = f"{at_least} and {at_most}" if above_zero else at_most if value > high else at_least
+        if not above_zero:  # name the bound that it is beyond
+            allowed = NumberRange(high=largest) if value > largest else NumberRange(low=-largest)
         yield (
-            f"{name}.{key}: got {number(value)}; expected a number in {in_words(unit)}, {bounds}. "
+            f"{name}.{key}: got {number(value)}; expected {allowed.words(in_words(unit))}. "
             f"{field.description}"
         )
 

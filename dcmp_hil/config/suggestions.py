@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.common.similar_names import did_you_mean
 from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.config.rig import KINDS, Rig
 from dcmp_hil.config.units import factor, in_words, split_unit, unit_named
@@ -34,9 +34,8 @@ def for_unknown_key(path: tuple[str, ...], value: Any, model: type[BaseModel]) -
 def for_unknown_kind(section: str, got: Any) -> str:
     """Return a remedy for an unknown kind: the known kinds, and the likely one."""
     kinds = [name for name in KINDS[section] if name != "custom"]
-    close = get_close_matches(str(got), kinds, n=1, cutoff=0.4)
-    hint = f' Did you mean "{close[0]}"?' if close else ""
-    return f"expected {kinds_in_words(section)}.{hint}"
+    hint = did_you_mean(str(got), kinds, cutoff=0.4)
+    return f"expected {kinds_in_words(section)}.{hint and ' '}{hint}"
 
 
 def kinds_in_words(section: str) -> str:
@@ -55,10 +54,9 @@ def for_text(key: str, text: str, schema: Mapping[str, Any]) -> str:
         for word in (*one.get("enum", ()), one.get("const"))
         if word is not None
     }
-    close = get_close_matches(text, words, n=1)
-    if close:
-        return f"Did you mean {toml_value(words[close[0]])}?"
-    return _quoted_number(key, text) if any(one.get("type") == "number" for one in branches) else ""
+    is_number = any(one.get("type") == "number" for one in branches)
+    otherwise = _quoted_number(key, text) if is_number else ""
+    return did_you_mean(text, words, otherwise, shown=lambda word: toml_value(words[word]))
 
 
 def _quoted_number(key: str, text: str) -> str:
@@ -138,8 +136,6 @@ def _tables() -> dict[str, list[type[BaseModel]]]:
 
 def _other_spelling(key: str, known: list[str]) -> str:
     """Compare whole keys, then keys without their units."""
-    close = get_close_matches(key, known, n=1, cutoff=0.6)
-    if not close:
-        stems = {split_unit(other)[0]: other for other in known}
-        close = [stems[stem] for stem in get_close_matches(split_unit(key)[0], list(stems), n=1, cutoff=0.6)]
-    return f"Did you mean {close[0]}?" if close else ""
+    stems = {split_unit(other)[0]: other for other in known}
+    by_stem = did_you_mean(split_unit(key)[0], stems, shown=lambda stem: stems[stem])
+    return did_you_mean(key, known, by_stem, shown=str)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.common.similar_names import did_you_mean
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.named_units import written_unit
 from dcmp_hil.offline.units import SI, bare, find_unit, known_unit
@@ -217,8 +217,7 @@ def _named(quantity: Quantity, header: Sequence[str], column: str) -> str:
         return same[0]
     if column.strip().isdigit() and 0 < int(column) <= len(header):  # by its place, from 1
         return header[int(column) - 1]
-    close = get_close_matches(column, header, n=1)
-    hint = f'Did you mean "{close[0]}"?' if close else "Name one of these."
+    hint = did_you_mean(column, header, "Name one of these.")
     raise ConfigError(f'--{quantity}: no column "{column}"; the header has: {listed(header)}. {hint}')
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from dcmp_hil.common.number_range import NumberRange
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.model import Model
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 InputKind = Literal["torque", "voltage", "none"]
 _PAPER_MODEL = Model()
 _CURRENT_FOLDER = Path()
+PERIOD_RANGE = NumberRange(1e-6, 10.0)
+"""s, of a nominal sampling period."""
+_COUNTS_RANGE = NumberRange(4.0, 1e9)  # a revolution
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
 
@@ -72,9 +76,9 @@ class ReplaySettings:
     def __post_init__(self) -> None:
         """Check every number against its range."""
         faults = [
-            f"{option}: got {value:g}{unit}, expected {_range(least, most, open_)}. {remedy}"
-            for option, value, unit, least, most, open_, remedy in self._ranges()
-            if not (least < value <= most if open_ else least <= value <= most)
+            f"{option}: got {value:g}; expected {allowed.words(unit)}. {remedy}"
+            for option, value, unit, allowed, remedy in self._ranges()
+            if not allowed.holds(value)
         ]
         if self.input_at not in ("start", "end"):
             faults.append(f'--input-at: got "{self.input_at}". Write start (row k-1) or end (row k).')
@@ -122,27 +126,38 @@ class ReplaySettings:
         keys = {key: value for key, value in gains.items() if key in table.model_fields and value is not None}
         return cast("ObserverSection", table.model_validate({"kind": self.observer, **keys}))
 
-    def _ranges(self) -> list[tuple[str, float, str, float, float, bool, str]]:
-        """Of those that are set: option, value, unit, least, most, whether the least is out, remedy."""
+    def _ranges(self) -> list[tuple[str, float, str, NumberRange, str]]:
+        """Of those that are set: option, value, unit, range, remedy."""
         counts = None if self.counts_per_rev == IDEAL else self.counts_per_rev
-        rows: list[tuple[str, float | str | None, str, float, float, bool, str]] = [
-            ("--f0", self.f0, " 1/s", 0.0, 1e3, False, "It is the viscous friction over the inertia."),
-            ("--inertia", self.inertia, " kg m2", 0.0, 1e6, True, "Give J in kg m2."),
-            ("--ku", self.ku, " (rad/s2)/V", 0.0, 1e6, True, "It is ku/J, the acceleration of one volt."),
-            ("--counts-per-rev", counts, "", 4.0, 1e9, False, "Give the counts after quadrature, or ideal."),
-            ("--period", self.period, " s", 1e-6, 10.0, False, "Leave it out to take the median step."),
-            ("--L1", self.L1, " 1/s", 0.0, 1e4, True, "The paper's is 4.9."),
-            ("--L2", self.L2, " 1/s2", 0.0, 1e4, True, "The paper's is 5.51."),
-            ("--M", self.M, " rad/s3", 0.0, 1e9, self.observer == "paper", "Leave it out for the default."),
-            ("--mu0", self.mu0, " rad/s", 0.0, 1e6, False, "Leave it out to go by the rule."),
-            ("--from", self.start, " s", 0.0, 1e9, False, "Write the seconds to leave out at the start."),
-            ("--cutoff", self.cutoff, " Hz", 0.0, 1e5, True, "The usual one is 15 Hz."),
+        of_M = NumberRange(0.0, 1e9, low_excluded=self.observer == "paper")
+        rows: list[tuple[str, float | str | None, str, NumberRange, str]] = [
+            ("--f0", self.f0, "1/s", NumberRange(0.0, 1e3), "It is the viscous friction over the inertia."),
+            ("--inertia", self.inertia, "kg m2", _above_zero(1e6), "Give J in kg m2."),
+            ("--ku", self.ku, "(rad/s2)/V", _above_zero(1e6), "It is ku/J, the acceleration of one volt."),
+            ("--counts-per-rev", counts, "", _COUNTS_RANGE, "Give the counts after quadrature, or ideal."),
+            ("--period", self.period, "s", PERIOD_RANGE, "Leave it out to take the median step."),
+            ("--L1", self.L1, "1/s", _above_zero(1e4), "The paper's is 4.9."),
+            ("--L2", self.L2, "1/s2", _above_zero(1e4), "The paper's is 5.51."),
+            ("--M", self.M, "rad/s3", of_M, "Leave it out for the default."),
+            ("--mu0", self.mu0, "rad/s", NumberRange(0.0, 1e6), "Leave it out to go by the rule."),
+            (
+                "--from",
+                self.start,
+                "s",
+                NumberRange(0.0, 1e9),
+                "Write the seconds to leave out at the start.",
+            ),
+            ("--cutoff", self.cutoff, "Hz", _above_zero(1e5), "The usual one is 15 Hz."),
         ]
         return [
-            (option, _number(value), unit, least, most, open_, remedy)
-            for option, value, unit, least, most, open_, remedy in rows
+            (option, _number(value), unit, allowed, remedy)
+            for option, value, unit, allowed, remedy in rows
             if value is not None
         ]
+
+
+def _above_zero(high: float) -> NumberRange:
+    return NumberRange(0.0, high, low_excluded=True)
 
 
 def _number(value: float | str) -> float:
@@ -150,7 +165,3 @@ def _number(value: float | str) -> float:
         return float(value)
     except ValueError:
         return math.nan  # in no range, so that it is named like any other fault
-
-
-def _range(least: float, most: float, open_: bool) -> str:
-    return f"a number {'above' if open_ else 'of at least'} {least:g} and of at most {most:g}"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import inspect
 import sys
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from dcmp_hil.common.similar_names import did_you_mean
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.plugins.error_text import file_of, message_of, place_of, place_of_code, shown_folder, syntax_of
 from dcmp_hil.plugins.module_search import Place, load, locate
@@ -106,10 +106,7 @@ def split_named(path: str, key: str, known: Iterable[str] = ()) -> tuple[str, st
     said = f'{key}: got "{path}"'
     module_name, colon, name = path.partition(":")
     if not colon:
-        close = get_close_matches(path, known, n=1)
-        hint = (
-            f'Did you mean "{close[0]}"?' if close else f"Write one of {', '.join(known)}, or module:Class."
-        )
+        hint = did_you_mean(path, known, f"Write one of {', '.join(known)}, or module:Class.")
         raise ConfigError(f"{said}, which is unknown. {hint}")
     if not all(part.isidentifier() for part in module_name.split(".")):
         raise ConfigError(f"{said}; expected module:Class, such as my_lab.rig:Motor.")
@@ -118,9 +115,8 @@ def split_named(path: str, key: str, known: Iterable[str] = ()) -> tuple[str, st
 
 def no_such_class(said: str, module: str, name: str, names: Iterable[str]) -> str:
     """Return the error that a module has no such class, with similar names."""
-    close = get_close_matches(name, [other for other in names if not other.startswith("_")], n=1)
-    hint = f" Did you mean {close[0]}?" if close else ""
-    return f"{said}, but {module} has no class {name}.{hint}"
+    hint = did_you_mean(name, [other for other in names if not other.startswith("_")], shown=str)
+    return f"{said}, but {module} has no class {name}.{hint and ' '}{hint}"
 
 
 def not_found(said: str, module: str, folders: Sequence[Path], error: ImportError | None = None) -> str:

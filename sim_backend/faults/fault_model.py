@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcmp_hil.common.number_range import NumberRange
+
 if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Mapping
@@ -33,6 +35,11 @@ class Number:
     low: float
     high: float
     default: float
+
+    @property
+    def allowed(self) -> NumberRange:
+        """Return the bounds."""
+        return NumberRange(self.low, self.high)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.number_range import NumberRange
+from dcmp_hil.common.similar_names import did_you_mean
 from sim_backend.faults.fault_model import Number
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
 _SECONDS_PER_UNIT = {"s": 1.0, "ms": 1e-3, "": 1.0}
 _PERCENT_RATIO = 0.01
-_START_TIME_MAX_S = 1e6
+_START_TIME_S = NumberRange(0.0, 1e6)
 
 
 class WrongFaultError(ValueError):
@@ -66,7 +66,7 @@ def _value(key: str, text: str, kind: Kind) -> Value:
     if unit == "s" and param.unit == "ms":
         number, unit = 1e3 * number, "ms"
     if unit not in ("", param.unit):
-        raise ValueError(f'{key}: got "{text}"; expected {_bounds(param)}.')
+        raise ValueError(f'{key}: got "{text}"; expected {param.allowed.words(param.unit)}.')
     return check(key, number, param)
 
 
@@ -76,7 +76,7 @@ def _time(key: str, text: str) -> Value:
     found = _NUMBER.fullmatch(text)
     if found and found[2] in _SECONDS_PER_UNIT:
         value = float(found[1]) * _SECONDS_PER_UNIT[found[2]]
-        if 0.0 <= value <= _START_TIME_MAX_S:
+        if _START_TIME_S.holds(value):
             return value
     words = 'a time such as 3s or 200ms, or "boot"' if key == "at" else "a time such as 3s or 200ms"
     raise ValueError(f'{key}: got "{text}"; expected {words}.')
@@ -85,7 +85,7 @@ def _time(key: str, text: str) -> Value:
 def _split(key: str, text: str, param: Number) -> tuple[float, str]:
     found = _NUMBER.fullmatch(text)
     if found is None:
-        raise ValueError(f'{key}: got "{text}"; expected {_bounds(param)}.')
+        raise ValueError(f'{key}: got "{text}"; expected {param.allowed.words(param.unit)}.')
     return float(found[1]), found[2]
 
 
@@ -101,17 +101,11 @@ def check(key: str, value: Value, param: Number | Choice) -> Value:
         if value not in param.words:
             raise ValueError(f'{key}: got "{value}"; expected {" or ".join(param.words)}.')
         return value
-    if isinstance(value, str) or not (math.isfinite(value) and param.low <= value <= param.high):
-        raise ValueError(f"{key}: got {value}; expected {_bounds(param)}.")
+    if isinstance(value, str) or not param.allowed.holds(value):
+        raise ValueError(f"{key}: got {value}; expected {param.allowed.words(param.unit)}.")
     return value
-
-
-def _bounds(param: Number) -> str:
-    unit = f" {param.unit}" if param.unit else ""
-    return f"a number from {param.low:g} to {param.high:g}{unit}"
 
 
 def _meant(got: str, known: Iterable[str]) -> str:
     names = list(known)
-    close = get_close_matches(got, names, n=1)
-    return f'Did you mean "{close[0]}"?' if close else f"Known: {', '.join(names)}."
+    return did_you_mean(got, names, f"Known: {', '.join(names)}.")
