@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.rate_limit import RateLimit
 from dcmp_hil.safety.reference_governor import Bounds, ReferenceGovernor
 from dcmp_hil.trip_request import TripRequest, Urgency
 from dcmp_hil.values import Event, EventKind, LimitData, Reference
@@ -93,7 +94,7 @@ class Limiter:
         self._notify = notify
         self.objection: TripRequest | None = None
         self._slews = slew < math.inf
-        self._said: dict[str, float] = {}
+        self._rate_limit = RateLimit(_EVENT_PERIOD_S)
         self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
         self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
         self.clamped = 0
@@ -153,25 +154,26 @@ class Limiter:
     def _say_governed(self, t: float, reference: Reference) -> None:
         x, v, a = reference
         if not abs(x) <= self._x:
-            self._say(t, "reference", f"reference limited to {self._x:.4g} rad: it asks for {x:.4g}")
+            self._say(t, "reference", "reference limited to {:.4g} rad: it asks for {:.4g}", self._x, x)
         elif not abs(v) <= self._v:
-            said = f"reference's velocity limited to {self._v:.4g} rad/s: it asks for {v:.4g}"
-            self._say(t, "velocity", said)
+            said = "reference's velocity limited to {:.4g} rad/s: it asks for {:.4g}"
+            self._say(t, "velocity", said, self._v, v)
         elif not abs(a) <= self._a:
-            said = f"reference's acceleration limited to {self._a:.4g} rad/s2: it asks for {a:.4g}"
-            self._say(t, "acceleration", said)
+            said = "reference's acceleration limited to {:.4g} rad/s2: it asks for {:.4g}"
+            self._say(t, "acceleration", said, self._a, a)
         else:
-            said = f"reference's way limited: the arm is led to {x:.4g} rad as the limits allow"
-            self._say(t, "way", said)
+            said = "reference's way limited: the arm is led to {:.4g} rad as the limits allow"
+            self._say(t, "way", said, x)
 
     def _limited_voltage(self, t: float, demand: float, last: float) -> float:
         most = self.voltage_limit
         voltage = max(-most, min(most, demand))
         if voltage != demand:
-            self._say(t, "voltage", f"voltage limited: {demand:.1f} V asked for, {most:.1f} V allowed")
+            said = "voltage limited: {:.1f} V asked for, {:.1f} V allowed"
+            self._say(t, "voltage", said, demand, most)
         slewed = self.limit_slew(voltage, last) if self._slews else voltage
         if slewed != voltage:
-            self._say(t, "slew", f"slew limited: {voltage:.1f} V asked for after {last:.1f} V")
+            self._say(t, "slew", "slew limited: {:.1f} V asked for after {:.1f} V", voltage, last)
         if slewed != demand:
             self._note_clamp(t, demand)
         return slewed
@@ -188,7 +190,6 @@ class Limiter:
                 Urgency.RAMP,
             )
 
-    def _say(self, t: float, limit: str, sentence: str) -> None:
-        if not t - self._said.get(limit, -math.inf) < _EVENT_PERIOD_S:
-            self._said[limit] = t
-            self._notify(Event(t, "WARN", EventKind.LIMIT, sentence, LimitData(limit)))
+    def _say(self, t: float, limit: str, sentence: str, *values: float) -> None:
+        if self._rate_limit.passes(limit, t):
+            self._notify(Event(t, "WARN", EventKind.LIMIT, sentence.format(*values), LimitData(limit)))
