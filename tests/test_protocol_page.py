@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from tools import protocol
-from tools.protocol import DBC, HEADER, PAGE, PYTHON, files, protocol_hash
+from tools.protocol import __main__ as protocol
+from tools.protocol.__main__ import PAGE, files
+from tools.protocol.dbc import DBC, ROOT, protocol_hash
+from tools.protocol.layout import MARK
 
 TEXT = DBC.read_text("utf-8")
 MEANT = re.compile(r"\s*(BO_|SG_|VAL_) ")
@@ -24,15 +26,26 @@ def _main(monkeypatch: pytest.MonkeyPatch) -> object:
 
 def test_every_file_is_what_the_dbc_says() -> None:
     made = files()
-    assert set(made) == {PAGE, PYTHON, HEADER}
+    assert PAGE in made
     for path, text in made.items():
-        assert path.read_text("utf-8") == text, f"{path}: python -m tools.protocol"
+        assert path.read_text("utf-8") == text, f"{path}: make generate"
+
+
+def test_every_generated_file_says_so_and_no_other_does() -> None:
+    marked = {
+        path
+        for folder in ("dcmp_hil", "sim_backend", "firmware")
+        for path in (ROOT / folder).rglob("*.[pch]*")
+        if path.suffix in {".py", ".c", ".h"} and MARK in path.read_text("utf-8").partition("\n")[0]
+    }
+    assert marked == set(files()) - {PAGE}
 
 
 def test_the_check_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert not _main(monkeypatch)
     assert capsys.readouterr().out == ""
-    monkeypatch.setattr(protocol, "files", lambda: files() | {HEADER: "another\n"})
+    header = ROOT / "firmware/core/dcmp_protocol_hash.h"
+    monkeypatch.setattr(protocol, "files", lambda: files() | {header: "another\n"})
     assert _main(monkeypatch)
     assert capsys.readouterr().out.startswith("firmware/core/dcmp_protocol_hash.h is not what dcmp.dbc says")
 

@@ -1,4 +1,4 @@
-/* Written by tools/protocol.py from dcmp.dbc. */
+/* Generated from firmware/proto/dcmp.dbc; `make generate` writes it. */
 #ifndef DCMP_PROTOCOL_HASH_H
 #define DCMP_PROTOCOL_HASH_H
 

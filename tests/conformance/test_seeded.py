@@ -23,7 +23,7 @@ from tests.conformance.seeded import SEEDS
 from tests.conformance.virtual import on
 from tests.contract.firmware_device import Firmware
 from tests.contract.reference_device import ReferenceDevice
-from tools.protocol import PAGE
+from tools.protocol.__main__ import PAGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What tools/protocol.py writes, read by others; that it is on disk is tested in test_protocol_page.py."""
+"""Examples of the page, read by others; that they are on disk is tested in test_protocol_page.py."""
 
 import re
 from pathlib import Path
@@ -9,8 +9,8 @@ import pytest
 
 from tests.firmware.bench import database
 from tests.wire.judge import KINDS
-from tools import protocol
-from tools.protocol import PAGE, files
+from tools.protocol import __main__ as protocol
+from tools.protocol.__main__ import PAGE, files
 
 ROW = re.compile(r"(?m)^\| (\w+) \((.*)\) \| ([0-9A-F ]+) \| ([0-9A-F ]+) \| `(\w+)` \|$")
 EXAMPLES = ROW.findall(PAGE.read_text("utf-8"))

@@ -1,0 +1,1 @@
+"""Code, page and hash that follow from firmware/proto/dcmp.dbc."""
