@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.stage_factory import controller_of, observer_of
 from dcmp_hil.config.variation import expected_variation
-from dcmp_hil.control import controllers, observers
+from dcmp_hil.control import controllers
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.friction_feedforward import KnownFriction
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
@@ -118,7 +118,7 @@ def assemble(
 
 def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
     """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
-    context = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
+    context = rig.observer_context
     observer = observer_of(rig.observer, context, rig.plugin_folders)
     if isinstance(rig.controller, PdSettings) and rig.controller.friction_feedforward:
         return KnownFriction(observer, context, trajectory.at, rig.delay)
@@ -143,7 +143,7 @@ def make_supervisor(
     limiter = make_limiter(rig, notify)
     checks: list[Check] = [*first, FiniteMonitor()]
     if limits.monitors == "all":
-        setting = observers.ObserverContext(rig.model.values(), rig.period, rig.encoder.counts)
+        setting = rig.observer_context
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
         position, velocity = limits.position_limit_rad, limits.velocity_limit_rad_s
         spare = resolution(rig.encoder.count, rig.period)

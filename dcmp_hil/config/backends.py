@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -36,15 +36,32 @@ class Traits:
         return None
 
 
-class Sim(Traits, Section):
+class BackendSettings(Traits, Section):
+    """The settings of a kind of `[backend]` that is part of the project."""
+
+    factory: ClassVar[str]
+    """`module:factory` that makes the backend; it takes (rig, clock)."""
+    listener: ClassVar[str] = ""
+    """`module:factory` of a link that only listens, of a device on a wire; it takes (settings, clock)."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """The word in rig.toml; each kind has a field of this name."""
+            ...
+
+
+class Sim(BackendSettings):
     """The simulated rig, without a wire."""
 
     simulated: ClassVar[bool] = True
+    factory: ClassVar[str] = "sim_backend.backend:SimBackend"
     kind: Literal["sim"] = "sim"
     """The simulated rig: plant, encoder and amplifier behind read and write."""
 
 
-class Device(Traits, Section):
+class Device(BackendSettings):
     """Settings common to all backends with a device on a wire."""
 
     device: ClassVar[bool] = True
@@ -64,6 +81,7 @@ class SimBoard(Device):
     """The firmware's own C in this process, the simulated plant on its pins, real bytes in between."""
 
     simulated: ClassVar[bool] = True
+    factory: ClassVar[str] = "sim_backend.board.backend:SimBoardBackend"
     kind: Literal["sim-board"]
     """The firmware's core compiled for this computer; needs a C compiler."""
     carrier: Literal["cobs", "slcan", "can"] = "cobs"
@@ -73,6 +91,8 @@ class SimBoard(Device):
 class Serial(Device):
     """A device on a serial port, COBS-framed."""
 
+    factory: ClassVar[str] = "dcmp_hil.device.links.serial:open_serial"
+    listener: ClassVar[str] = "dcmp_hil.device.links.serial:listen"
     kind: Literal["serial"]
     """A serial port (pyserial)."""
     port: Annotated[str, Field(min_length=1, max_length=200, examples=["/dev/ttyACM0"])]
@@ -89,6 +109,8 @@ class Serial(Device):
 class Can(Device):
     """A device on a CAN bus."""
 
+    factory: ClassVar[str] = "dcmp_hil.device.links.can:open_can"
+    listener: ClassVar[str] = "dcmp_hil.device.links.can:listen"
     kind: Literal["can"]
     """A CAN interface (python-can)."""
     interface: Annotated[str, Field(min_length=1, max_length=40, examples=["socketcan"])] = "socketcan"

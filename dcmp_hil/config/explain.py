@@ -9,9 +9,8 @@ from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.config.reference_reach import beyond_reach
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.suggestions import kinds_in_words
-from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.paper import PaperSettings
-from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings, bandwidth_floor, slope_bound
+from dcmp_hil.control.controllers.settings import ControllerSettings
+from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.safety.polarity_check import probe_for
 
 if TYPE_CHECKING:
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from dcmp_hil.config.rig import Rig
-
-_DAMPING_RATIO_MIN = 0.5
-_MU0_RULE_RATIO_MAX = 3.0
 
 
 def explain(rig: Rig) -> list[tuple[str, str, str]]:
@@ -44,7 +40,8 @@ def _rows(section: BaseModel, prefix: str, rig: Rig) -> list[tuple[str, str, str
         if isinstance(value, dict):
             rows += [(f"{prefix}{name}.{option}", toml_value(of), meaning) for option, of in value.items()]
             continue
-        rows.append((f"{prefix}{name}", _by_rule(name, rig) if value is None else toml_value(value), meaning))
+        shown = _by_rule(section, name, rig) if value is None else toml_value(value)
+        rows.append((f"{prefix}{name}", shown, meaning))
     return rows
 
 
@@ -64,52 +61,35 @@ def _numbers(section: BaseModel, prefix: str, rig: Rig) -> Iterator[tuple[str, f
         value = getattr(section, name)
         if hasattr(value, "model_fields_set"):
             yield from _numbers(value, f"{prefix}{name}.", rig)
-        value = by_rule(name, rig) if value is None else value
+        value = by_rule(section, name, rig) if value is None else value
         if isinstance(value, int | float) and not isinstance(value, bool):
             yield f"{prefix}{name}", float(value)
 
 
-def by_rule(name: str, rig: Rig) -> float | None:
+def by_rule(section: BaseModel, name: str, rig: Rig) -> float | None:
     """Return what the rule makes of a key that was left out; None where there is no rule."""
-    if name == "mu0_rad_s":
-        return bandwidth_floor(rig.encoder.counts, rig.period)
-    return slope_bound(rig.encoder.counts) if name == "M_rad_s3" else None
+    return section.by_rule(name, rig.observer_context) if isinstance(section, ObserverSettings) else None
 
 
-def _by_rule(name: str, rig: Rig) -> str:
-    value = by_rule(name, rig)
+def _by_rule(section: BaseModel, name: str, rig: Rig) -> str:
+    value = by_rule(section, name, rig)
     return "none" if value is None else f"{value:.4g} (by rule)"
 
 
 def warnings(rig: Rig) -> list[str]:
     """Return warnings of settings that are valid and rarely intended."""
-    rules = (_observer, _damping, _monitors, _immediate, _probe, _soft_start, _signs)
+    rules = (_observer, _controller, _monitors, _immediate, _probe, _soft_start, _signs)
     return [sentence for rule in rules if (sentence := rule(rig))] + beyond_reach(rig)
 
 
 def _observer(rig: Rig) -> str:
-    observer, counts = rig.observer, rig.encoder.counts
-    if isinstance(observer, PaperSettings) and counts is not None:
-        return (
-            f"observer: the paper's Euler observer on an encoder of {counts:g} counts costs ten times the "
-            'voltage variation; kind = "super_twisting" is made for it.'
-        )
-    if isinstance(observer, SuperTwistingSettings) and observer.mu0_rad_s is not None:
-        usual = bandwidth_floor(counts, rig.period)
-        if observer.mu0_rad_s == 0.0:
-            return "observer.mu0_rad_s = 0: without its floor the loop runs away on a motor 25 % too strong."
-        if not usual / _MU0_RULE_RATIO_MAX <= observer.mu0_rad_s <= usual * _MU0_RULE_RATIO_MAX:
-            return f"observer.mu0_rad_s = {observer.mu0_rad_s:g} is far from the rule's {usual:.3g} rad/s."
+    if isinstance(rig.observer, ObserverSettings):
+        return rig.observer.warning(rig.observer_context)
     return ""
 
 
-def _damping(rig: Rig) -> str:
-    if not isinstance(rig.controller, PdSettings) or rig.controller.kp_1_s2 == 0.0:
-        return ""
-    zeta = rig.controller.kd_1_s / (2.0 * math.sqrt(rig.controller.kp_1_s2))
-    if zeta >= _DAMPING_RATIO_MIN:
-        return ""
-    return f"controller: damping kd/(2 sqrt kp) = {zeta:.2f} will ring; kd = 2 sqrt kp gives 1."
+def _controller(rig: Rig) -> str:
+    return rig.controller.warning() if isinstance(rig.controller, ControllerSettings) else ""
 
 
 def _monitors(rig: Rig) -> str:

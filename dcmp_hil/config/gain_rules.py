@@ -6,12 +6,9 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dcmp_hil.common.number_range import number
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers import ObserverContext
-from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers.settings import ObserverLimits, ObserverSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 from dcmp_hil.control.stability import LinearLoop, LoopSpec, bandwidths
 from dcmp_hil.safety.chatter import FLOOR_V_S
@@ -25,9 +22,6 @@ _MOTOR_GAIN_RATIO_MIN = 0.8  # times the believed motor gain, for which the loop
 _MOTOR_GAIN_RATIO_MAX = 1.25  # the same, upper bound
 _NOISE_VOLTAGE_SHARE_MAX = 0.25
 """Of the voltage limit, that the encoder's count alone may cost (standard deviation)."""
-_OBSERVER_BANDWIDTH_MIN_RAD_S = 4.0
-"""Rad/s, of the observer's floor: below it an arm that is led to its limits overshoots them."""
-_GROWTH_MIN_1_S, _SWING_SHARE_MAX = 0.1, 0.1  # 1/s; of the velocity limit
 _GAIN_KEYS = (
     ("loop", "rate_hz"),
     ("loop", "delay_samples"),
@@ -63,7 +57,7 @@ def loops(rig: RigTables) -> list[LinearLoop]:
         return []
     model, count = rig.model.values(), rig.encoder.count
     spec = LoopSpec(model, rig.period, rig.loop.delay_samples, rig.controller.position == "measured", count)
-    tuning = rig.observer.tuning(ObserverContext(model, rig.period, rig.encoder.counts))
+    tuning = rig.observer.tuning(rig.observer_context)
     return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
 
 
@@ -71,9 +65,11 @@ def _fault(rig: RigTables) -> Callable[[], str] | None:
     """Return a function that describes the fault, None without one; only it computes the margins."""
     if rig.supervisor.monitors != "all":
         return None
-    if isinstance(rig.observer, PaperSettings) and (fault := _euler_fault(rig, rig.observer)):
-        return partial(str, fault)
-    if isinstance(rig.observer, SuperTwistingSettings) and (fault := _slow_fault(rig, rig.observer)):
+    torque = rig.model.ku_rad_s2_V * rig.amplifier.limit
+    limits = ObserverLimits(rig.encoder.count, rig.supervisor.velocity_limit_rad_s, torque)
+    if isinstance(rig.observer, ObserverSettings) and (
+        fault := rig.observer.fault(rig.observer_context, limits)
+    ):
         return partial(str, fault)
     for loop in loops(rig):
         if not (loop.stable() and loop.stable(_MOTOR_GAIN_RATIO_MIN) and loop.stable(_MOTOR_GAIN_RATIO_MAX)):
@@ -96,46 +92,6 @@ def _rough(loop: LinearLoop, limit: float) -> str:
         return (
             f"with these gains the encoder's steps alone make the voltage change by {variation:,.0f} V/s on "
             f"average, and from {FLOOR_V_S:,.0f} V/s on it is chatter"
-        )
-    return ""
-
-
-def _slow_fault(rig: RigTables, observer: SuperTwistingSettings) -> str:
-    """Return a fault if the differentiator cannot follow gravity: neither by its floor nor by its slope."""
-    tuning = observer.tuning(ObserverContext(rig.model.values(), rig.period, rig.encoder.counts))
-    fastest = rig.model.gravity_rad_s2 * rig.supervisor.velocity_limit_rad_s
-    if observer.mu0_rad_s is None or tuning.mu0 >= _OBSERVER_BANDWIDTH_MIN_RAD_S or fastest <= tuning.M:
-        return ""
-    return (
-        f"a floor below {number(_OBSERVER_BANDWIDTH_MIN_RAD_S)} rad/s does not follow what gravity does to "
-        "an arm that moves fast, and it passes its limits. Raise observer.mu0_rad_s, or leave it out; where "
-        f"the encoder is fine enough, observer.M_rad_s3 = {fastest:.4g}, gravity times "
-        "supervisor.velocity_limit_rad_s, does it too."
-    )
-
-
-def _euler_fault(rig: RigTables, observer: PaperSettings) -> str:
-    """Return a fault if the paper's explicit Euler steps diverge, or oscillate by more than the arm does."""
-    step, count = rig.period, rig.encoder.count
-    copy = np.array([[-observer.L1_1_s, 1.0], [-observer.L2_1_s2, -rig.model.f0_1_s]])
-    if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH_MIN_1_S * step:
-        return (
-            f"explicit Euler steps of {1e3 * step:g} ms are not stable with these gains. Lower "
-            "observer.L1_1_s and observer.L2_1_s2, or raise loop.rate_hz."
-        )
-    noise = max(observer.L1_1_s * count, step * observer.L2_1_s2 * count)
-    noise += 2.0 * (observer.M_rad_s3 * count * count) ** (1 / 3)
-    if noise > _SWING_SHARE_MAX * rig.supervisor.velocity_limit_rad_s:
-        return (
-            f"one count of the encoder moves the estimated velocity by {noise:.3g} rad/s, a tenth of "
-            "supervisor.velocity_limit_rad_s and more. Lower observer.L1_1_s, observer.L2_1_s2 or "
-            "observer.M_rad_s3."
-        )
-    swing = observer.M_rad_s3 * step  # of w_hat in a period
-    if swing > rig.model.ku_rad_s2_V * rig.amplifier.limit:
-        return (
-            f"in explicit Euler steps the estimated disturbance swings by {swing:.3g} rad/s2, more than the "
-            "motor has at amplifier.voltage_limit_V. Lower observer.M_rad_s3, or raise loop.rate_hz."
         )
     return ""
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
-
-from dcmp_hil.control.references.periodic import Chirp, Sine
-from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,43 +11,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config.rig import Rig
 
 _LOOK_AHEAD_S = 60.0  # s of a csv reference that are looked at where the run has no end
-_REFERENCE_POINTS = 2000
 _WATCH_RATIO_MIN = 1.5  # of what pushes a healthy arm, that its watch needs
 _HOLDING_TORQUE_SHARE_MAX = 0.95  # of the motor's torque, that holding the arm may take
-
-
-class Peaks(NamedTuple):
-    """The largest of what a reference asks for, either way."""
-
-    position: float  # rad
-    velocity: float  # rad/s
-    acceleration: float  # rad/s2
-
-
-def peaks(rig: Rig) -> Peaks:
-    """Return what the reference of a rig asks for once it has faded in."""
-    reference = rig.reference
-    if isinstance(reference, Sine):
-        amplitude, rate = reference.amplitude_rad, reference.rate_rad_s
-        return Peaks(abs(reference.offset_rad) + amplitude, amplitude * rate, amplitude * rate * rate)
-    if isinstance(reference, Chirp):
-        amplitude = reference.amplitude_rad
-        rate = math.tau * max(reference.from_hz, reference.to_hz)
-        slope = math.tau * abs(reference.to_hz - reference.from_hz) / reference.sweep_s
-        farthest = abs(reference.offset_rad) + amplitude
-        return Peaks(farthest, amplitude * rate, amplitude * max(rate * rate, slope))
-    if isinstance(reference, Hold):
-        return Peaks(abs(reference.position_rad), 0.0, 0.0)
-    if isinstance(reference, Step):
-        return Peaks(max(abs(reference.before_rad), abs(reference.after_rad)), 0.0, 0.0)
-    if isinstance(reference, Trapezoid):
-        low, high = reference.low_rad, reference.high_rad
-        hardest = reference.acceleration_rad_s2 if low != high else 0.0
-        fastest = min(reference.velocity_rad_s, math.sqrt(abs(high - low) * hardest))
-        return Peaks(max(abs(low), abs(high)), fastest, hardest)
-    length = rig.run.duration_s or _LOOK_AHEAD_S
-    looks = [reference.at(length * k / _REFERENCE_POINTS) for k in range(_REFERENCE_POINTS + 1)]
-    return Peaks(*(max(map(abs, column)) for column in zip(*looks, strict=True)))
 
 
 def beyond_reach(rig: Rig) -> list[str]:
@@ -59,7 +21,7 @@ def beyond_reach(rig: Rig) -> list[str]:
 
 
 def _beyond(rig: Rig) -> Iterator[str]:
-    asked = peaks(rig)
+    asked = rig.reference.peaks(rig.run.duration_s or _LOOK_AHEAD_S)
     position, velocity = rig.supervisor.reference_limits
     if not asked.position <= position:
         yield f"reference: it leaves supervisor.position_limit_rad and will be held at {position:.4g} rad."

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Self
 
-from pydantic import Discriminator, Field, PrivateAttr, Tag
+from pydantic import Field, PrivateAttr
 
 from dcmp_hil.common.section import Section
-from dcmp_hil.config.backends import Can, CustomBackend, Serial, Sim, SimBoard
+from dcmp_hil.config.backends import Sim
+from dcmp_hil.config.kinds import BackendSection, ControllerSection, ObserverSection, ReferenceSection
 from dcmp_hil.config.sections import (
     AmplifierSection,
-    Custom,
-    CustomController,
     EncoderSection,
     LoopSection,
     ModelSection,
@@ -23,11 +22,9 @@ from dcmp_hil.config.sections import (
     TimingSection,
 )
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers import ObserverContext
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.control.references.periodic import Chirp, Sine
-from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
-from dcmp_hil.control.references.table import Table
+from dcmp_hil.control.references.periodic import Sine
 
 if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
@@ -36,45 +33,6 @@ _TOTAL_ACCELERATION_SHARE = 0.85  # of all that the motor has
 _SPARE_ACCELERATION_SHARE = 0.7  # of what is left
 _SPARE_ACCELERATION_SHARE_MIN = 0.25  # the same, at least, of all
 _PLANT_STEP_MAX_S = 200e-6  # s: every figure of the project's tables holds there
-
-
-def _kind_or_custom(default: str) -> Discriminator:
-    def kind(value: Any) -> str:
-        got = value.get("kind", default) if isinstance(value, dict) else getattr(value, "kind", default)
-        return "custom" if ":" in str(got) else str(got)
-
-    return Discriminator(kind)
-
-
-BackendSection = Annotated[
-    Annotated[Sim, Tag("sim")]
-    | Annotated[SimBoard, Tag("sim-board")]
-    | Annotated[Serial, Tag("serial")]
-    | Annotated[Can, Tag("can")]
-    | Annotated[CustomBackend, Tag("custom")],
-    _kind_or_custom("sim"),
-]
-ObserverSection = Annotated[
-    Annotated[SuperTwistingSettings, Tag("super_twisting")]
-    | Annotated[PaperSettings, Tag("paper")]
-    | Annotated[Custom, Tag("custom")],
-    _kind_or_custom("super_twisting"),
-]
-ControllerSection = Annotated[
-    Annotated[PdSettings, Tag("pd_compensated")]
-    | Annotated[PdSettings, Tag("pd")]
-    | Annotated[CustomController, Tag("custom")],
-    _kind_or_custom("pd_compensated"),
-]
-ReferenceSection = Annotated[
-    Annotated[Sine, Tag("sine")]
-    | Annotated[Chirp, Tag("chirp")]
-    | Annotated[Hold, Tag("hold")]
-    | Annotated[Step, Tag("step")]
-    | Annotated[Trapezoid, Tag("trapezoid")]
-    | Annotated[Table, Tag("csv")],
-    _kind_or_custom("sine"),
-]
 
 
 class RigTables(Section):
@@ -117,6 +75,11 @@ class RigTables(Section):
     def period(self) -> float:
         """Nominal period, s."""
         return 1.0 / self.loop.rate_hz
+
+    @property
+    def observer_context(self) -> ObserverContext:
+        """Facts of the rig for its observer."""
+        return ObserverContext(self.model.values(), self.period, self.encoder.counts)
 
     @property
     def delay(self) -> float:

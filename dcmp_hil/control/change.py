@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dcmp_hil.control.controllers import Gains
-    from dcmp_hil.control.observers.super_twisting import Tuning
     from dcmp_hil.control.references import ReferenceSource
 
 
@@ -17,7 +15,7 @@ class Change(NamedTuple):
 
     words: str  # "controller.kp_1_s2: 4000 -> 5200", for people
     values: Mapping[str, float | str]  # new values by dotted key, for programs
-    gains: Gains | None = None
-    tuning: Tuning | None = None
+    gains: NamedTuple | None = None
+    tuning: object | None = None  # what the observer's `retune` takes
     reference: ReferenceSource | None = None
     variation: float | None = None  # V/s, that is expected of the voltage afterwards

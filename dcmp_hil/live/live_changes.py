@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
-from dcmp_hil.control.controllers import Gains
 from dcmp_hil.ipc.mailbox import APPLIED, BELL_WORD, FAILED, LOWERING, Answer
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from dcmp_hil.control.change import Change
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.control.observers.super_twisting import Tuning
     from dcmp_hil.control.trajectory import Trajectory
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.safety.chatter import Chatter
@@ -174,27 +172,27 @@ class LiveChanges:
 
 
 class _Tuned(Protocol):
-    """An observer of ours: a tuning is sent to no other."""
+    """An observer whose settings have tunable keys: a tuning is sent to no other."""
 
-    def retune(self, tuning: Tuning) -> None: ...
+    def retune(self, tuning: object) -> None: ...
 
 
 class _Geared(Protocol):
-    """A controller of ours: gains are sent to no other."""
+    """A controller whose settings have gains: gains are sent to no other."""
 
-    gains: Gains
+    gains: NamedTuple
 
 
 class _Ramp:
     """Gains on their way."""
 
-    def __init__(self, controller: _Geared, wanted: Gains, t: float) -> None:
+    def __init__(self, controller: _Geared, wanted: NamedTuple, t: float) -> None:
         self._controller, self._wanted, self._t0 = controller, wanted, t
         self._from = controller.gains
 
     def over(self, t: float) -> bool:
         """Set the gains of device time `t`, s; tell whether they are the wanted ones."""
         s = min(max((t - self._t0) / GAIN_RAMP_TIME_S, 0.0), 1.0)
-        kp, kd, compensation = (a + s * (b - a) for a, b in zip(self._from, self._wanted, strict=True))
-        self._controller.gains = Gains(kp, kd, compensation) if s < 1.0 else self._wanted
+        between = (a + s * (b - a) for a, b in zip(self._from, self._wanted, strict=True))
+        self._controller.gains = self._wanted._make(between) if s < 1.0 else self._wanted
         return s == 1.0

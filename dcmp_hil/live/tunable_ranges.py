@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.rules import within_reason
 from dcmp_hil.config.units import in_words, split_unit
-from dcmp_hil.live.tunables import allowed, settable, value_of
+from dcmp_hil.live.tunables import allowed, choices, settable, value_of
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -33,7 +32,6 @@ _SEARCH_HALVINGS, _RELATIVE_STEP = 12, 1e-3  # of the search; of a value, the ne
 _SLIDER_MAX = 1e9  # of a key without a bound
 _ANGLE_RANGE_RAD = (-3.0, 3.0)
 _MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
-_NO_KIND = ("custom", "csv")
 
 
 def tunable_descriptions(rig: Rig) -> list[dict[str, Any]]:
@@ -42,9 +40,8 @@ def tunable_descriptions(rig: Rig) -> list[dict[str, Any]]:
 
 
 def _choice(rig: Rig, key: str) -> dict[str, Any]:
-    section = key.partition(".")[0]
-    kinds = [kind for kind in KINDS[section] if kind not in _NO_KIND]
-    return {"key": key, "value": value_of(rig, key), "choices": kinds}
+    table = key.partition(".")[0]
+    return {"key": key, "value": value_of(rig, key), "choices": choices(rig, table)}
 
 
 def _number(rig: Rig, key: str) -> dict[str, Any]:

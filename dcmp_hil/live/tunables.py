@@ -9,13 +9,13 @@ from dcmp_hil.config.explain import by_rule, warnings
 from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.config.gain_rules import holds
 from dcmp_hil.config.reference_reach import beyond_reach
+from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
-from dcmp_hil.control import observers
+from dcmp_hil.control.controllers.settings import ControllerSettings
+from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.control.change import Change
-from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
-from dcmp_hil.control.references.table import Table
+from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -23,29 +23,36 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
 
-_CONTROLLER_KEYS = ("kind", "kp_1_s2", "kd_1_s")
-_OBSERVER_KEYS = ("mu0_rad_s", "M_rad_s3", "L1_1_s", "L2_1_s2")
-_NOT_OF_REFERENCE = ("soft_start_s",)  # it is over, or would jump
+_TUNABLE_TABLES = ("controller", "observer", "reference")
 
 
 def settable(rig: Rig) -> list[str]:
     """List the dotted keys that may change while this rig runs."""
-    keys: list[str] = []
-    if isinstance(rig.controller, PdSettings):
-        keys += [f"controller.{key}" for key in _CONTROLLER_KEYS]
-    if isinstance(rig.observer, SuperTwistingSettings):
-        keys += [f"observer.{key}" for key in _OBSERVER_KEYS]
-    if isinstance(rig.reference, Table):
-        return [*keys, "reference.kind"]
-    fields = type(rig.reference).model_fields
-    return [*keys, *(f"reference.{key}" for key in fields if key not in _NOT_OF_REFERENCE)]
+    sections = {table: getattr(rig, table) for table in _TUNABLE_TABLES}
+    return [
+        f"{table}.{key}"
+        for table, section in sections.items()
+        if not isinstance(section, Custom)
+        for key in section.tunable()
+    ]
+
+
+def choices(rig: Rig, table: str) -> list[str]:
+    """Return the kinds to which a run can change: any reference, and kinds of the same class."""
+    now = type(getattr(rig, table))
+    return [
+        kind
+        for kind, settings in KINDS[table].items()
+        if settings is now or (issubclass(settings, ReferenceSettings) and settings.in_run)
+    ]
 
 
 def value_of(rig: Rig, key: str) -> Any:
     """Return what a settable key is; what the rig leaves to a rule is worked out."""
-    section, name = key.split(".")
-    value = getattr(getattr(rig, section), name)
-    return by_rule(name, rig) if value is None else value
+    table, name = key.split(".")
+    section = getattr(rig, table)
+    value = getattr(section, name)
+    return by_rule(section, name, rig) if value is None else value
 
 
 def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
@@ -73,14 +80,16 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
     keys = [override.partition("=")[0].strip() for override in overrides]
     _refuse(rig, [key for key in keys if _known(rig, key) and key not in settable(rig)])
     after = change_rig(rig, overrides)
-    if isinstance(after.reference, Table) and after.reference != rig.reference:
+    if not after.reference.in_run and after.reference != rig.reference:
+        kind = after.reference.kind
         raise ConfigError(
-            'reference.kind: "csv" is read before a run, not in one. Start another run with it.'
+            f'reference.kind: "{kind}" is read before a run, not in one. Start another run with it.'
         )
     _refuse(after, [key for key in keys if key not in settable(after)])
     if type(after.controller) is not type(rig.controller) or type(after.observer) is not type(rig.observer):
         raise ConfigError(
-            "A class of your own takes the place of no other in a run. Start another run with it."
+            "Another class, or one of your own, takes the place of no other in a run. "
+            "Start another run with it."
         )
     if after.reference != rig.reference and (faults := beyond_reach(after)):
         raise ConfigError(*faults)
@@ -128,12 +137,10 @@ def _known(rig: Rig, key: str) -> bool:
 
 def _worked_out(before: Rig, after: Rig) -> Change:
     gains = tuning = None
-    if isinstance(after.controller, PdSettings) and after.controller != before.controller:
+    if isinstance(after.controller, ControllerSettings) and after.controller != before.controller:
         gains = after.controller.gains
-    if isinstance(after.observer, SuperTwistingSettings) and after.observer != before.observer:
-        tuning = after.observer.tuning(
-            observers.ObserverContext(after.model.values(), after.period, after.encoder.counts)
-        )
+    if isinstance(after.observer, ObserverSettings) and after.observer != before.observer:
+        tuning = after.observer.tuning(after.observer_context)
     reference = after.reference.source() if after.reference != before.reference else None
     values = _different(before, after)
     words = _in_words(before, values)

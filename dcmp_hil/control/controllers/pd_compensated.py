@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Literal
 
-from dcmp_hil.common.section import NotNegative, Section
+from dcmp_hil.common.section import NotNegative
 from dcmp_hil.control.controllers import Gains
+from dcmp_hil.control.controllers.settings import ControllerSettings
 
 if TYPE_CHECKING:
     from dcmp_hil.control.controllers import ControllerContext
     from dcmp_hil.values import Estimate, Reference
 
+_DAMPING_RATIO_MIN = 0.5
 
-class PdSettings(Section):
+
+class PdSettings(ControllerSettings):
     """`[controller]` with `kind = "pd_compensated"` (eq. 10) or `"pd"` (the same without w_hat)."""
 
     kind: Literal["pd_compensated", "pd"] = "pd_compensated"
@@ -35,6 +39,20 @@ class PdSettings(Section):
         return PdCompensated(
             context, kp=self.kp_1_s2, kd=self.kd_1_s, compensate=self.kind == "pd_compensated"
         )
+
+    @classmethod
+    def tunable(cls) -> tuple[str, ...]:
+        """Return the keys that may change in a run; the two kinds are one class, so `kind` is among them."""
+        return ("kind", "kp_1_s2", "kd_1_s")
+
+    def warning(self) -> str:
+        """Return a warning of a loop that will ring."""
+        if self.kp_1_s2 == 0.0:
+            return ""
+        zeta = self.kd_1_s / (2.0 * math.sqrt(self.kp_1_s2))
+        if zeta >= _DAMPING_RATIO_MIN:
+            return ""
+        return f"controller: damping kd/(2 sqrt kp) = {zeta:.2f} will ring; kd = 2 sqrt kp gives 1."
 
 
 class PdCompensated:

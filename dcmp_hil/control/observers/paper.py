@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Literal
 
-from dcmp_hil.common.section import Positive, Section
+import numpy as np
+
+from dcmp_hil.common.section import Positive
 from dcmp_hil.control.observers import standing_still
+from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
+    from dcmp_hil.control.observers.settings import ObserverLimits
 
 _LAMBDA1, _LAMBDA2, _LAMBDA3 = 2.0, 1.5, 1.1
+_GROWTH_MIN_1_S, _SWING_SHARE_MAX = 0.1, 0.1  # 1/s; of the velocity limit
 
 
-class PaperSettings(Section):
+class PaperSettings(ObserverSettings):
     """`[observer]` with `kind = "paper"`."""
 
     kind: Literal["paper"] = "paper"
@@ -33,6 +38,40 @@ class PaperSettings(Section):
         return PaperObserver(
             context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, from_zero=self.start == "zero"
         )
+
+    def warning(self, context: ObserverContext) -> str:
+        """Return a warning where there is an encoder, which the paper's observer is not made for."""
+        if context.counts_per_rev is None:
+            return ""
+        return (
+            f"observer: the paper's Euler observer on an encoder of {context.counts_per_rev:g} counts costs "
+            'ten times the voltage variation; kind = "super_twisting" is made for it.'
+        )
+
+    def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:
+        """Return a fault if the explicit Euler steps diverge, or oscillate by more than the arm does."""
+        step, count = context.period, limits.count_rad
+        copy = np.array([[-self.L1_1_s, 1.0], [-self.L2_1_s2, -context.model.f0]])
+        if np.abs(np.linalg.eigvals(np.eye(2) + step * copy)).max() > 1.0 + _GROWTH_MIN_1_S * step:
+            return (
+                f"explicit Euler steps of {1e3 * step:g} ms are not stable with these gains. Lower "
+                "observer.L1_1_s and observer.L2_1_s2, or raise loop.rate_hz."
+            )
+        noise = max(self.L1_1_s * count, step * self.L2_1_s2 * count)
+        noise += 2.0 * (self.M_rad_s3 * count * count) ** (1 / 3)
+        if noise > _SWING_SHARE_MAX * limits.velocity:
+            return (
+                f"one count of the encoder moves the estimated velocity by {noise:.3g} rad/s, a tenth of "
+                "supervisor.velocity_limit_rad_s and more. Lower observer.L1_1_s, observer.L2_1_s2 or "
+                "observer.M_rad_s3."
+            )
+        swing = self.M_rad_s3 * step  # of w_hat in a period
+        if swing > limits.torque:
+            return (
+                f"in explicit Euler steps the estimated disturbance swings by {swing:.3g} rad/s2, more than "
+                "the motor has at amplifier.voltage_limit_V. Lower observer.M_rad_s3, or raise loop.rate_hz."
+            )
+        return ""
 
 
 class PaperObserver:

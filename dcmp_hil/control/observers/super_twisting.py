@@ -8,17 +8,22 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from pydantic import Field
 
 from dcmp_hil.common.fast_tuple import make
-from dcmp_hil.common.section import NotNegative, Positive, Section
+from dcmp_hil.common.section import NotNegative, Positive
 from dcmp_hil.control.observers import standing_still
 from dcmp_hil.control.observers.discretisation import ObserverGains, copy_step, luenberger_copy, matched_gains
+from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
 
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
+    from dcmp_hil.control.observers.settings import ObserverLimits
 
 _GAP_PERIODS_MAX = 10  # periods; after a longer one nothing is left to continue from
 _STEP_TOLERANCE_PERIODS = 0.02  # of a period: a step this close to a whole number of periods counts as that
 _WATCH_BANDWIDTH_RATIO, _WATCH_BANDWIDTH_MAX_RAD_S = 2.5, 100.0  # times the rule; rad/s
+_MU0_RULE_RATIO_MAX = 3.0
+_BANDWIDTH_MIN_RAD_S = 4.0
+"""Rad/s, of the floor: below it an arm that is led to its limits overshoots them."""
 _INNOVATION_MIN_RAD = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
 
 
@@ -36,7 +41,7 @@ class Tuning(NamedTuple):
     gaps: dict[int, _Step]  # by the number of periods
 
 
-class SuperTwistingSettings(Section):
+class SuperTwistingSettings(ObserverSettings):
     """`[observer]` with `kind = "super_twisting"`."""
 
     kind: Literal["super_twisting"] = "super_twisting"
@@ -56,6 +61,41 @@ class SuperTwistingSettings(Section):
     def build(self, context: ObserverContext) -> SuperTwisting:
         """Make the observer for a rig."""
         return SuperTwisting(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
+
+    @classmethod
+    def tunable(cls) -> tuple[str, ...]:
+        """Return the keys that may change in a run."""
+        return ("mu0_rad_s", "M_rad_s3", "L1_1_s", "L2_1_s2")
+
+    def by_rule(self, name: str, context: ObserverContext) -> float | None:
+        """Return what the rule makes of a key that was left out; None where there is no rule."""
+        if name == "mu0_rad_s":
+            return bandwidth_floor(context.counts_per_rev, context.period)
+        return slope_bound(context.counts_per_rev) if name == "M_rad_s3" else None
+
+    def warning(self, context: ObserverContext) -> str:
+        """Return a warning of a floor that is far from the rule's."""
+        if self.mu0_rad_s is None:
+            return ""
+        usual = bandwidth_floor(context.counts_per_rev, context.period)
+        if self.mu0_rad_s == 0.0:
+            return "observer.mu0_rad_s = 0: without its floor the loop runs away on a motor 25 % too strong."
+        if not usual / _MU0_RULE_RATIO_MAX <= self.mu0_rad_s <= usual * _MU0_RULE_RATIO_MAX:
+            return f"observer.mu0_rad_s = {self.mu0_rad_s:g} is far from the rule's {usual:.3g} rad/s."
+        return ""
+
+    def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:
+        """Return a fault if the differentiator can follow gravity neither by its floor nor by its slope."""
+        tuning = self.tuning(context)
+        fastest = context.model.gravity * limits.velocity
+        if self.mu0_rad_s is None or tuning.mu0 >= _BANDWIDTH_MIN_RAD_S or fastest <= tuning.M:
+            return ""
+        return (
+            f"a floor below {_BANDWIDTH_MIN_RAD_S:g} rad/s does not follow what gravity does to "
+            "an arm that moves fast, and it passes its limits. Raise observer.mu0_rad_s, or leave it out; "
+            f"where the encoder is fine enough, observer.M_rad_s3 = {fastest:.4g}, gravity times "
+            "supervisor.velocity_limit_rad_s, does it too."
+        )
 
 
 def bandwidth_floor(counts_per_rev: float | None, period: float) -> float:

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.references import ReferenceSettings
+from dcmp_hil.control.references import Peaks, ReferenceSettings
 from dcmp_hil.values import Reference
 
 
@@ -49,6 +49,11 @@ class Sine(ReferenceSettings):
         """Return the sine without pydantic, for the loop."""
         return SineWave(self.amplitude_rad, self.rate_rad_s, self.phase_rad, self.offset_rad)
 
+    def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - at some time it asks for all of it
+        """Return what it asks for at most."""
+        amplitude, rate = self.amplitude_rad, self.rate_rad_s
+        return Peaks(abs(self.offset_rad) + amplitude, amplitude * rate, amplitude * rate * rate)
+
 
 class Chirp(ReferenceSettings):
     """A sine whose frequency rises linearly over `sweep_s` and then stays."""
@@ -76,3 +81,11 @@ class Chirp(ReferenceSettings):
         return Reference(
             self.offset_rad + sine, rate * cosine, 2 * math.pi * slope * cosine - rate * rate * sine
         )
+
+    def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - a sweep is judged as a whole
+        """Return what it asks for at most."""
+        amplitude = self.amplitude_rad
+        rate = math.tau * max(self.from_hz, self.to_hz)
+        slope = math.tau * abs(self.to_hz - self.from_hz) / self.sweep_s
+        farthest = abs(self.offset_rad) + amplitude
+        return Peaks(farthest, amplitude * rate, amplitude * max(rate * rate, slope))

@@ -4,7 +4,7 @@ import math
 from typing import Literal
 
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.references import ReferenceSettings
+from dcmp_hil.control.references import Peaks, ReferenceSettings
 from dcmp_hil.values import Reference
 
 
@@ -18,6 +18,10 @@ class Hold(ReferenceSettings):
     def at(self, t: float) -> Reference:  # noqa: ARG002 - the same at every instant
         """Return the reference `t` seconds after the start."""
         return Reference(self.position_rad, 0.0, 0.0)
+
+    def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - the same at every instant
+        """Return what it asks for at most."""
+        return Peaks(abs(self.position_rad), 0.0, 0.0)
 
 
 class Step(ReferenceSettings):
@@ -34,6 +38,10 @@ class Step(ReferenceSettings):
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
         return Reference(self.after_rad if t >= self.at_s else self.before_rad, 0.0, 0.0)
+
+    def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - before and after the step
+        """Return what it asks for at most; the step itself is bounded by the governor."""
+        return Peaks(max(abs(self.before_rad), abs(self.after_rad)), 0.0, 0.0)
 
 
 class Trapezoid(ReferenceSettings):
@@ -66,6 +74,13 @@ class Trapezoid(ReferenceSettings):
         start, way = (self.low_rad, distance) if there % 2 == 0 else (self.high_rad, -distance)
         x, v, a = trapezoid(min(into / move, 1.0), ramp / move)
         return Reference(start + way * x, way * v / move, way * a / move**2)
+
+    def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - a move is judged as a whole
+        """Return what it asks for at most."""
+        low, high = self.low_rad, self.high_rad
+        hardest = self.acceleration_rad_s2 if low != high else 0.0
+        fastest = min(self.velocity_rad_s, math.sqrt(abs(high - low) * hardest))
+        return Peaks(max(abs(low), abs(high)), fastest, hardest)
 
 
 def trapezoid(s: float, ramp: float) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,7 @@ _ROWS_MIN = 2
 class Table(ReferenceSettings):
     """Columns `time_s` and `position_rad`; a cubic spline at rest at both ends, held after the last point."""
 
+    in_run: ClassVar[bool] = False
     kind: Literal["csv"]
     file: str = Field(min_length=1)
     """CSV file with the columns time_s and position_rad; relative to the folder of rig.toml."""

@@ -1,15 +1,19 @@
-"""The tables of backends and listeners: names in rig.toml to `module:factory`."""
+"""Backends and listeners by the kind of `[backend]`: read from the settings of each kind."""
 
-BACKENDS = {
-    "sim": "sim_backend.backend:SimBackend",
-    "sim-board": "sim_backend.board.backend:SimBoardBackend",
-    "serial": "dcmp_hil.device.links.serial:open_serial",
-    "can": "dcmp_hil.device.links.can:open_can",
-}
-"""Backends; a factory takes (rig, clock)."""
+from __future__ import annotations
 
-LISTENERS = {
-    "serial": "dcmp_hil.device.links.serial:listen",
-    "can": "dcmp_hil.device.links.can:listen",
-}
-"""Links to listen on, one for every device on a wire; a factory takes (settings, clock)."""
+from typing import TYPE_CHECKING
+
+from dcmp_hil.config.backends import BackendSettings
+from dcmp_hil.config.rig import KINDS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_SETTINGS = {kind: one for kind, one in KINDS["backend"].items() if issubclass(one, BackendSettings)}
+
+BACKENDS: Mapping[str, str] = {kind: one.factory for kind, one in _SETTINGS.items()}
+"""`module:factory` of every backend; a factory takes (rig, clock)."""
+
+LISTENERS: Mapping[str, str] = {kind: one.listener for kind, one in _SETTINGS.items() if one.listener}
+"""`module:factory` of every link that one can listen to; a factory takes (settings, clock)."""
