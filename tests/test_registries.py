@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 import rerun.blueprint as rrb
 
-from dcmp_hil.config import load_rig
-from dcmp_hil.config.backends import Device, SimBoard
+from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.config import kinds, load_rig
+from dcmp_hil.config.backends import BackendSettings, CustomBackend, Device, SimBoard
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import SimSection
+from dcmp_hil.control.controllers.settings import ControllerSettings
+from dcmp_hil.control.observers.settings import ObserverSettings
+from dcmp_hil.control.references import ReferenceSettings
+from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.links import registry
 from dcmp_hil.device.links.listen_only import make_listening_link
+from dcmp_hil.live.tunables import settable
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins.named_class import find_named
 from dcmp_hil.telemetry import signals
@@ -32,8 +40,10 @@ from tests.telemetry.runs import VIEW, feed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
+    from dcmp_hil.common.section import Section
+
+OWN = {KINDS[table]["custom"] for table in ("backend", "observer", "controller")}
 SHIPPED = [kind for kind in KINDS["backend"] if kind != "custom"]
 OTHER_COLOURS = ((1, 2, 3), (9, 8, 250))
 MORE = (
@@ -44,7 +54,11 @@ MORE = (
 
 def rig_of(kind: str, *overrides: str) -> Any:
     """Return the bench rig with a kind of backend, and the keys that it needs."""
-    needed = {"serial": ("backend.port=/dev/ttyACM0",)}.get(kind, ())
+    needed = [
+        f"backend.{name}={field.examples[0]}"  # type: ignore[index]
+        for name, field in KINDS["backend"].get(kind, CustomBackend).model_fields.items()
+        if field.is_required() and name != "kind"
+    ]
     return bench(f"backend.kind={kind}", *needed, *overrides)
 
 
@@ -111,10 +125,61 @@ def test_every_kind_is_a_word_that_its_table_takes(table: str) -> None:
         assert kind == "custom" or kind in get_args(section.model_fields["kind"].annotation)
 
 
+BASES: dict[str, type[Section]] = {
+    "backend": BackendSettings,
+    "observer": ObserverSettings,
+    "controller": ControllerSettings,
+    "reference": ReferenceSettings,
+}
+
+
+def derived(base: type[Section]) -> Iterator[type[Section]]:
+    """Yield every class of settings in the package that makes a kind."""
+    for settings in base.__subclasses__():
+        if settings.__module__.startswith("dcmp_hil.") and "kind" in settings.model_fields:
+            yield settings
+        yield from derived(settings)
+
+
+@pytest.mark.parametrize("table", BASES)
+def test_every_class_of_settings_is_in_the_list_of_kinds(table: str) -> None:
+    module = BASES[table].__module__
+    room = module.removesuffix(".settings").removesuffix(".backends")
+    for file in Path(str(import_module(module).__file__)).parent.glob("*.py"):
+        import_module(room if file.stem == "__init__" else f"{room}.{file.stem}")
+    assert set(derived(BASES[table])) == set(KINDS[table].values()) - OWN
+
+
+@pytest.mark.parametrize("table", ["observer", "controller", "reference"])
+def test_every_key_that_a_kind_calls_tunable_can_change_in_a_run(table: str, tmp_path: Path) -> None:
+    (tmp_path / "csv").write_text("time_s,position_rad\n0,0\n1,0.5\n")
+    for kind, section in KINDS[table].items():
+        if section in OWN:
+            continue
+        keys = section.tunable()  # type: ignore[attr-defined]
+        assert set(keys) <= section.model_fields.keys()
+        needed = [f"reference.file={tmp_path / 'csv'}"] if kind == "csv" else []
+        rig = bench(f"{table}.kind={kind}", *needed)
+        assert [f"{table}.{key}" for key in keys] == [key for key in settable(rig) if key.startswith(table)]
+        if keys and table == "observer":
+            assert callable(getattr(make_observer(rig, Trajectory(rig.reference.source(), 0.0)), "retune", None))
+        if keys and table == "controller":
+            assert isinstance(make_controller(rig).gains, tuple)  # type: ignore[attr-defined]
+
+
+def test_every_kind_of_controller_says_which_position_it_gets() -> None:
+    assert all("position" in section.model_fields for section in KINDS["controller"].values())
+
+
 @pytest.mark.parametrize("table", ["observer", "controller"])
 def test_every_shipped_kind_can_be_built(table: str) -> None:
     for kind, section in KINDS[table].items():
         assert (kind == "custom") != callable(getattr(section, "build", None))
+
+
+def test_a_class_that_is_no_kind_of_its_table_is_refused() -> None:
+    with pytest.raises(TypeError, match="is not derived from ObserverSettings"):
+        kinds.union_of(ObserverSettings, kinds.CONTROLLERS)
 
 
 # ------------------------------------------------------------------------------------------------ faults

@@ -35,7 +35,7 @@ REFERENCES = (
 )
 
 
-def _union(base: type[BaseModel], paths: tuple[str, ...], own: type[BaseModel] | None = None) -> Any:
+def union_of(base: type[BaseModel], paths: tuple[str, ...], own: type[BaseModel] | None = None) -> Any:
     """Return the union of the kinds of a table, tagged by their words; `own` is for `module:Class`."""
     tagged = []
     for path in paths:
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     ControllerSection = ControllerSettings | CustomController
     ReferenceSection = ReferenceSettings
 else:
-    BackendSection = _union(BackendSettings, BACKENDS, CustomBackend)
-    ObserverSection = _union(ObserverSettings, OBSERVERS, Custom)
-    ControllerSection = _union(ControllerSettings, CONTROLLERS, CustomController)
-    ReferenceSection = _union(ReferenceSettings, REFERENCES)
+    BackendSection = union_of(BackendSettings, BACKENDS, CustomBackend)
+    ObserverSection = union_of(ObserverSettings, OBSERVERS, Custom)
+    ControllerSection = union_of(ControllerSettings, CONTROLLERS, CustomController)
+    ReferenceSection = union_of(ReferenceSettings, REFERENCES)

@@ -12,9 +12,9 @@ from dcmp_hil.config.reference_reach import beyond_reach
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.variation import expected_variation
+from dcmp_hil.control.change import Change
 from dcmp_hil.control.controllers.settings import ControllerSettings
 from dcmp_hil.control.observers.settings import ObserverSettings
-from dcmp_hil.control.change import Change
 from dcmp_hil.control.references import ReferenceSettings
 from dcmp_hil.errors import ConfigError
 

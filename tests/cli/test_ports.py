@@ -23,7 +23,8 @@ from tests.cli.ports import SAMPLE
 from tests.cli.test_wire_errors import device, only_line, path_of
 from tests.contract.benches import on_bench
 from tests.contract.driving import drive
-from tests.contract.pump import Pump, VirtualBus
+from tests.contract.ports.virtual_bus import VirtualBus
+from tests.contract.pump import Pump
 from tests.device.line import line
 from tests.helpers import bench
 

@@ -14,7 +14,8 @@ import serial
 
 from dcmp_hil.device.links import serial as serial_link
 from sim_backend.board.board import Board
-from tests.contract.pump import PtyPort, Pump
+from tests.contract.ports.pty import PtyPort
+from tests.contract.pump import Pump
 from tests.helpers import bench
 
 if TYPE_CHECKING:

@@ -21,7 +21,9 @@ from dcmp_hil.conformance.runner import run_checks
 from dcmp_hil.platform.clock import MonotonicClock
 from sim_backend.board.virtual_device import VirtualDevice
 from tests.conformance.seeded import SEEDS
-from tests.contract.pump import PtyPort, Pump, VirtualBus
+from tests.contract.ports.pty import PtyPort
+from tests.contract.ports.virtual_bus import VirtualBus
+from tests.contract.pump import Pump
 from tests.contract.reference_device import ReferenceDevice
 from tests.firmware.core_library import compiler
 from tests.helpers import bench

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.device.backend import DeviceBackend
@@ -12,7 +13,7 @@ from dcmp_hil.device.factory import open_backend
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from sim_backend.board.backend import SimBoardBackend
 from sim_backend.board.board import Board
-from tests.contract.pump import PtyPort, Pump, VirtualBus
+from tests.contract.pump import Port, Pump
 from tests.contract.reference_board import ReferenceBoard
 from tests.helpers import bench
 
@@ -26,11 +27,15 @@ IN_PROCESS = (
     *("sim-board cobs", "sim-board slcan", "sim-board can"),
     *("reference cobs", "reference slcan", "reference can"),
 )
-PUMPED = ("can virtual", "slcan pty", "cobs pty")
+FAR_ENDS: dict[str, Callable[[], tuple[Port, tuple[str, ...]]]] = {
+    name: make
+    for file in sorted((Path(__file__).parent / "ports").glob("*.py"))
+    for name, make in import_module(f"tests.contract.ports.{file.stem}").BENCHES.items()
+}
+"""`carrier port` to what makes the port and the keys of `[backend]` that lead to it: one module a port."""
+PUMPED = tuple(FAR_ENDS)
 WIRED = (*IN_PROCESS, *PUMPED)
 ALL = ("sim", *WIRED)
-
-_channels = itertools.count()
 
 
 class PatientClock(MonotonicClock):
@@ -109,16 +114,7 @@ def on_bench(kind: str, *overrides: str, **of_board: int) -> Iterator[Bench]:
 def pumped(kind: str, overrides: tuple[str, ...], make: Callable[[Rig, str], Any]) -> Iterator[Bench]:
     """Set up a bench whose board is behind a port of the system; `make` makes the board."""
     carrier = kind.split(maxsplit=1)[0]
-    way: tuple[str, ...]
-    if carrier == "can":
-        channel = f"contract-{next(_channels)}"
-        port: VirtualBus | PtyPort = VirtualBus(channel)
-        way = ("backend.kind=can", "backend.interface=virtual", f"backend.channel={channel}")
-    else:
-        port = PtyPort()
-        serial = ("backend.kind=serial", f"backend.port={port.path}")
-        slcan = ("backend.kind=can", "backend.interface=slcan", f"backend.channel={port.path}")
-        way = serial if carrier == "cobs" else slcan
+    port, way = FAR_ENDS[kind]()
     rig = bench(*way, *overrides)
     pump = Pump(make(rig, carrier), port)
     pump.start()

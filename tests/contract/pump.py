@@ -1,15 +1,9 @@
-"""A board at the far end of a real port, a pseudo terminal or python-can's virtual bus, in a thread."""
+"""A board at the far end of a real port, in a thread; the ports are in the folder beside."""
 
 from __future__ import annotations
 
-import contextlib
-import os
-import select
 import threading
-import tty
 from typing import TYPE_CHECKING, Protocol
-
-import can
 
 if TYPE_CHECKING:
     from sim_backend.board.board import Board
@@ -30,58 +24,6 @@ class Port(Protocol):
     def close(self) -> None:
         """Close the host's end of the line."""
         ...
-
-
-class PtyPort:
-    """The master of a pseudo terminal."""
-
-    def __init__(self) -> None:
-        self._master, slave = os.openpty()
-        tty.setraw(slave)
-        self.path = os.ttyname(slave)
-        self._slave = slave  # stays open, or the master would hang up between two hosts
-        os.set_blocking(self._master, False)
-
-    def exchange(self, board: Board, seconds: float) -> bool:
-        self._send(board.transmit())
-        ready, _, _ = select.select([self._master], [], [], seconds)
-        if not ready:
-            return False
-        board.receive(os.read(self._master, 4096))
-        self._send(board.transmit())
-        return True
-
-    def close(self) -> None:
-        os.close(self._slave)
-        os.close(self._master)
-
-    def _send(self, data: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):  # no reader
-            os.write(self._master, data)
-
-
-class VirtualBus:
-    """The far end of python-can's virtual bus."""
-
-    def __init__(self, channel: str) -> None:
-        self.channel = channel
-        self._bus = can.Bus(channel=channel, interface="virtual", ignore_config=True)
-
-    def exchange(self, board: Board, seconds: float) -> bool:
-        self._send(board)
-        message = self._bus.recv(seconds)
-        if message is None:
-            return False
-        board.receive_frame(message.arbitration_id, bytes(message.data))
-        self._send(board)
-        return True
-
-    def close(self) -> None:
-        self._bus.shutdown()
-
-    def _send(self, board: Board) -> None:
-        for number, data in board.transmit_frames():
-            self._bus.send(can.Message(arbitration_id=number, data=data, is_extended_id=False))
 
 
 class Pump(threading.Thread):

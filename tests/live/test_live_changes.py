@@ -133,7 +133,7 @@ def test_run_is_the_same_to_the_bit_when_no_change_is_applied(*, withdrawn: bool
 def test_run_goes_on_when_the_slot_holds_rubbish() -> None:
     from dcmp_hil.control.change import Change
 
-    run = ChangedRun({_AT: Change("nonsense", {}, tuning=(1.0,))})  # type: ignore[arg-type]
+    run = ChangedRun({_AT: Change("nonsense", {}, tuning=(1.0,))})
     result = run.run()
     assert run.answers[0] is not None
     assert run.answers[0].what == FAILED
