@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dcmp_hil.config.tables import ControllerSection, ObserverSection
+    from dcmp_hil.config.kinds import ControllerSection, ObserverSection
     from dcmp_hil.control.controllers import Controller, ControllerContext
     from dcmp_hil.control.observers import Observer, ObserverContext
 

@@ -15,7 +15,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins.named_class import split_named
 
 if TYPE_CHECKING:
-    from dcmp_hil.config.tables import ObserverSection
+    from dcmp_hil.config.kinds import ObserverSection
 
 InputKind = Literal["torque", "voltage", "none"]
 _PAPER_MODEL = Model()
