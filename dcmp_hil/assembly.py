@@ -80,7 +80,6 @@ def assemble(
         model=rig.model.values(),
         backend=backend,
     )
-    measured = rig.controller.position == "measured"
     chatter = make_chatter(rig)
     changes = mailbox and LiveChanges(
         mailbox,
@@ -101,7 +100,7 @@ def assemble(
         backend=backend,
         outlier_filter=outlier_filter,
         observer=faults.observer(observer),
-        predictor=Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured),
+        predictor=make_predictor(rig),
         trajectory=trajectory,
         controller=faults.controller(controller),
         supervisor=supervisor,
@@ -129,6 +128,12 @@ def make_controller(rig: Rig) -> Controller:
     """Make the controller that `[controller]` asks for."""
     context = controllers.ControllerContext(rig.model.values(), rig.period)
     return controller_of(rig.controller, context, rig.plugin_folders)
+
+
+def make_predictor(rig: Rig) -> Predictor:
+    """Make what carries the estimate to the instant at which a command acts."""
+    measured = rig.controller.position == "measured"
+    return Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
 
 
 def make_supervisor(

@@ -15,12 +15,61 @@ if TYPE_CHECKING:
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.predictor import Predictor
-    from dcmp_hil.control.trajectory import Trajectory
     from dcmp_hil.live.live_changes import Changes
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
     from dcmp_hil.safety.outlier_filter import OutlierFilter
-    from dcmp_hil.safety.supervisor import Supervisor
+    from dcmp_hil.safety.polarity_check import MotorGain
+    from dcmp_hil.trip_request import TripRequest
+    from dcmp_hil.values import Estimate, Reference, Sample
+
+
+class TrajectoryStage(Protocol):
+    """Protocol of the trajectory: `dcmp_hil.control.trajectory.Trajectory`, or that of a recording."""
+
+    def hold(self, position: float) -> None:
+        """Stay at `position` (rad) until the trajectory begins."""
+        ...
+
+    def begin(self, t: float, position: float) -> None:
+        """Begin at device time `t` (s), from `position` (rad)."""
+        ...
+
+    def lower(self, t: float) -> None:
+        """Go down to hanging from device time `t` (s) on."""
+        ...
+
+    def at(self, t: float) -> Reference:
+        """Return the reference at device time `t` (s)."""
+        ...
+
+
+class SupervisorStage(Protocol):
+    """Protocol of the last word: `dcmp_hil.safety.supervisor.Supervisor`, or that of a recording."""
+
+    over: TripRequest | None
+    stopping: bool
+
+    @property
+    def motor_gain(self) -> MotorGain | None:
+        """Result of the polarity check; None without one."""
+        ...
+
+    def engages(self, sample: Sample) -> bool:
+        """Return whether the trajectory begins in this cycle."""
+        ...
+
+    def limit_reference(self, sample: Sample, reference: Reference, /) -> Reference:
+        """Return what of a reference is allowed."""
+        ...
+
+    def safe_voltage(self, sample: Sample, estimate: Estimate, demand: float) -> float:
+        """Return the voltage to send, V."""
+        ...
+
+    def stop(self, cause: TripRequest, t: float) -> None:
+        """Begin to end the run in the cycle of device time `t` (s)."""
+        ...
 
 
 class Telemetry(Protocol):
@@ -45,9 +94,9 @@ class LoopStages:
     outlier_filter: OutlierFilter
     observer: Observer
     predictor: Predictor
-    trajectory: Trajectory
+    trajectory: TrajectoryStage
     controller: Controller
-    supervisor: Supervisor
+    supervisor: SupervisorStage
     telemetry: Telemetry
     deadline_monitor: DeadlineMonitor
     clock: Clock

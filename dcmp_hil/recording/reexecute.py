@@ -3,33 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dcmp_hil.assembly import make_controller, make_observer
-from dcmp_hil.control.predictor import Predictor
+from dcmp_hil import loop
+from dcmp_hil.assembly import make_controller, make_observer, make_predictor
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.ipc.mailbox import Mailbox
-from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.live.live_changes import LiveChanges
+from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.recording.recorded_changes import changes_in
+from dcmp_hil.recording.replay_backend import (
+    Outcomes,
+    RecordedSupervisor,
+    RecordedTrajectory,
+    RepeatedChanges,
+    ReplayBackend,
+)
 from dcmp_hil.recording.untrusted import UnreadTable, check_numbers, refuse_named
-from dcmp_hil.values import EventKind, Reference, Sample
+from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
+from dcmp_hil.safety.outlier_filter import OutlierFilter
+from dcmp_hil.values import EventKind
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.reader import RecordedRun
-    from dcmp_hil.values import Estimate, Event
-
-_FIELD_NUMBERS = {name: place for place, name in enumerate(FIELDS)}
+    from dcmp_hil.values import Event
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,7 @@ class Reexecution:
 
 
 def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Reexecution:
-    """Hand the recorded samples, references and voltages to observer, predictor and controller.
+    """Run the loop over a recording: its samples, references and voltages are as they were.
 
     Changes that were made while it went on are made again, in the same cycle.
 
@@ -87,28 +95,38 @@ def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
 
 
 def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexecution:
+    backend, outcomes = ReplayBackend(recorded.rows), Outcomes()
     observer, controller = make_observer(rig, trajectory), make_controller(rig)
-    measured = rig.controller.position == "measured"
-    predictor = Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
-    past = _Past(recorded, trajectory, rig.delay)
     mailbox = Mailbox()
     changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_ignore_event)
-    made = deque(changes_in(recorded.events, rig, whole=not recorded.damage))
-    estimates, demands = [], []
-    for row in recorded.rows.tolist():
-        sample = Sample(row[0], row[1], row[2], int(row[3]))
-        estimate = observer.update(sample)
-        past.follow(row, estimate)
-        ahead = predictor.ahead(sample, estimate)
-        demands.append(controller.update(Reference(*row[_FIELD_NUMBERS["position_ahead"] :][:3]), ahead))
-        predictor.sent(row[_FIELD_NUMBERS["voltage_sent"]])
-        estimates.append(estimate)
-        if made and made[0][0] <= sample.t:  # later where the period itself is missing
-            mailbox.put(made.popleft()[1])
-        changes.apply(sample.t)
-    again = Reexecution(np.array(estimates, float).reshape(-1, 3), np.array(demands, float))
+    made = changes_in(recorded.events, rig, whole=not recorded.damage)
+    stages = loop.LoopStages(
+        backend=backend,
+        outlier_filter=OutlierFilter(math.inf, rig.period, rig.encoder.count),  # outliers are missing already
+        observer=observer,
+        predictor=make_predictor(rig),
+        trajectory=RecordedTrajectory(backend, trajectory),
+        controller=controller,
+        supervisor=RecordedSupervisor(backend),
+        telemetry=outcomes,
+        deadline_monitor=DeadlineMonitor(rig.period),
+        clock=SimulatedClock(),
+        delay=rig.delay,
+        changes=RepeatedChanges(made, mailbox, changes),
+    )
+    _run(stages, backend, [event.t for event in recorded.events if event.kind is EventKind.LOWERING])
+    again = Reexecution(np.array(outcomes.estimates, float).reshape(-1, 3), np.array(outcomes.demands, float))
     _check_own(again, observer, controller)
     return again
+
+
+def _run(stages: loop.LoopStages, backend: ReplayBackend, lowered: Sequence[float]) -> None:
+    """Run the loop to the end of the recording; at each time of `lowered`, s, the way down begins."""
+    for until in (*lowered, math.inf):
+        if not backend.requested:
+            loop.run(stages, until, backend)
+        if not backend.requested:
+            stages.trajectory.lower(until + stages.delay)
 
 
 def _check_own(again: Reexecution, *stages: object) -> None:
@@ -122,26 +140,3 @@ def _check_own(again: Reexecution, *stages: object) -> None:
 
 def _ignore_event(_: Event) -> None:
     """Drop the event: the recording holds it already."""
-
-
-class _Past:
-    """Takes the trajectory through what happened to it: held, begun, lowered. Friction is told from it."""
-
-    def __init__(self, recorded: RecordedRun, trajectory: Trajectory, delay: float) -> None:
-        self._trajectory, self._delay = trajectory, delay
-        self._lowered = deque(event.t for event in recorded.events if event.kind is EventKind.LOWERING)
-        self._holds = True
-        self._began = math.inf
-
-    def follow(self, row: list[float], estimate: Estimate) -> None:
-        """Repeat the trajectory's transitions of the recorded cycle."""
-        t, began = row[0], row[_FIELD_NUMBERS["began"]]
-        if self._holds:  # the first period of the run, and of the way down
-            self._holds = False
-            self._trajectory.hold(estimate.position)
-        if began <= t and began != self._began:  # earlier where the period itself is missing
-            self._began = began
-            self._trajectory.begin(began, estimate.position)
-        if self._lowered and self._lowered[0] <= t:
-            self._trajectory.lower(self._lowered.popleft() + self._delay)
-            self._holds = True
