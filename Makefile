@@ -53,8 +53,9 @@ format: $(DEV) ## bring the code into its format, and mend what ruff can mend
 	@$(BIN)/ruff check --fix
 	@$(BIN)/ruff format
 
-generate: $(DEV) ## write again what is made from the DBC and from the rig's tables
+generate: $(DEV) ## write again what is made from the DBC, from the rig's tables and from the boards
 	@$(BIN)/python -m tools.protocol
+	@$(BIN)/python -m tools.boards
 	@$(BIN)/python -m tools.schema
 	@$(BIN)/python -m tools.traces
 

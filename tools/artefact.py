@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
+from tools.boards import read_boards, released
 
 FIRMWARE = Path(__file__).resolve().parent.parent / "firmware"
-BOARDS = ("bench_f405_dac", "bench_f405_pwm")
 PIECES = ("elf", "bin", "vectors.bin", "code.bin", "map")
 INSTALL = "apt install --no-install-recommends cmake gcc-arm-none-eabi"
 _MEMORY_USE = re.compile(r"^\s*(\w+):\s+(\d+) B\s+(\d+) (KB|MB|B)", re.MULTILINE)
@@ -52,7 +52,7 @@ def release(built: Path, target: Path, sizes: dict[str, dict[str, int]]) -> dict
     """Copy what is released; return what is known of it, as it stands in `manifest.json`."""
     target.mkdir(parents=True, exist_ok=True)
     manifest: dict[str, object] = {"protocol_hash": f"0x{PROTOCOL_HASH:08x}", "boards": {}}
-    for board in BOARDS:
+    for board in released(read_boards()):
         files = {}
         for piece in PIECES:
             data = (built / f"{board}.{piece}").read_bytes()

@@ -18,7 +18,7 @@ from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
 from sim_backend.board.config import board_config
 from tools import brown_out
-from tools.artefact import BOARDS
+from tools.boards import read_boards, released
 from tools.brown_out import OptionError
 from tools.record import RECORD_ADDRESS, RecordLink, image, record
 
@@ -35,7 +35,6 @@ INSTALL = {
 _STM32FLASH_COMMAND = ["stm32flash", "-b", "115200"]  # to the boot loader
 _DAC_FULL_SCALE_V = 10.0  # V, full scale unless it is said
 _SUPPLY_RANGE_V = (1.0, 100.0)  # V
-_BOARD_NUMBERS = {"bench_f405_dac": 3, "bench_f405_pwm": 5}  # the parameter BOARD
 
 
 class Piece(NamedTuple):
@@ -77,7 +76,7 @@ def record_of(
             f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
         )
     full_scale = _full_scale(rig, board, full_scale_V, supply_V)
-    config = board_config(rig, _BOARD_NUMBERS[board])
+    config = board_config(rig, read_boards()[board].number)
     full_scale_mV = round(1e3 * full_scale)
     if config["voltage_limit_mV"] > full_scale_mV:
         raise ConfigError(
@@ -93,7 +92,7 @@ def record_of(
 def _full_scale(rig: Rig, board: str, full_scale_V: float | None, supply_V: float | None) -> float:
     """Return what the board puts out at most, V: of a PWM board it is the supply, and nothing is assumed."""
     rig_supply = rig.amplifier.supply_V
-    if not board.endswith("_pwm"):
+    if read_boards()[board].amplifier != "pwm":
         if supply_V is not None or rig_supply != "none":
             where = "--supply-V" if supply_V is not None else "amplifier.supply_V"
             raise ConfigError(f"{where}: {board} divides no supply. Leave it out; see --full-scale-V.")
@@ -127,7 +126,7 @@ def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tools.flash", description=__doc__)
-    parser.add_argument("board", choices=BOARDS)
+    parser.add_argument("board", choices=released(read_boards()))
     parser.add_argument("rig", help="whose limits and link the board is to have: a name, or a rig.toml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets")
     parser.add_argument("--full-scale-V", type=float, dest="full_scale_V", help="of a DAC (default: 10)")

@@ -11,14 +11,27 @@ list(FILTER SOC_SOURCES EXCLUDE REGEX amplifier_)
 file(GLOB APP_SOURCES CONFIGURE_DEPENDS app/*.c)
 set(LINKER_SCRIPT ${CMAKE_CURRENT_SOURCE_DIR}/soc/stm32f4/stm32f405.ld)
 
-function(dcmp_board name)
+set(PROGRAM soc/stm32f4/bench/bench.c soc/stm32f4/bench/vectors.c)
+set(SETTINGS soc/stm32f4/bench/settings.c)
+
+# The program of the board that board_read has read.
+function(dcmp_board folder)
+  set(name ${BOARD_NAME})
+  set(drivers ${SOC_SOURCES})
+  if(BOARD_SOURCES)
+    set(sources ${BOARD_SOURCES} ${SETTINGS} boards/native/plant_port.c)
+    list(FILTER drivers EXCLUDE REGEX "bxcan|quadrature") # of pins that its board.h does not have
+  else()
+    set(sources ${PROGRAM} ${SETTINGS} soc/stm32f4/amplifier_${BOARD_AMPLIFIER}.c)
+  endif()
   if(DCMP_COMPILER STREQUAL "clang")
-    add_library(${name} OBJECT ${ARGN} ${SOC_SOURCES} ${APP_SOURCES})
+    add_library(${name} OBJECT ${sources} ${drivers} ${APP_SOURCES})
     target_include_directories(${name} PRIVATE core)
   else()
-    add_executable(${name} ${ARGN} ${SOC_SOURCES} ${APP_SOURCES})
+    add_executable(${name} ${sources} ${drivers} ${APP_SOURCES})
     set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${LINKER_SCRIPT})
-    target_link_options(${name} PRIVATE -nostdlib -nostartfiles -T${LINKER_SCRIPT} -Wl,--gc-sections
+    target_link_options(${name} PRIVATE -nostdlib -nostartfiles -Wl,--defsym=FLASH_KIB=${BOARD_FLASH_KIB}
+                        -Wl,--defsym=RAM_KIB=${BOARD_RAM_KIB} -T${LINKER_SCRIPT} -Wl,--gc-sections
                         -Wl,--fatal-warnings -Wl,--print-memory-usage -Wl,-Map=${name}.map)
     target_link_libraries(${name} PRIVATE core gcc)
     # Two pieces for flashing, with the board's record between them, and one image of both for an empty chip.
@@ -28,17 +41,18 @@ function(dcmp_board name)
       COMMAND ${CMAKE_OBJCOPY} -O binary -R .vectors $<TARGET_FILE:${name}> ${name}.code.bin
       COMMAND ${CMAKE_OBJCOPY} -O binary --gap-fill 0xFF -R .stack -R .bss -R .noinit $<TARGET_FILE:${name}> ${name}.bin)
   endif()
-  target_include_directories(${name} PRIVATE app soc/stm32f4 boards/f405)
+  target_include_directories(${name} PRIVATE ${folder} app soc/stm32f4 soc/stm32f4/bench)
+  if(BOARD_SOURCES)
+    target_include_directories(${name} PRIVATE boards/native) # the plant port
+  endif()
 endfunction()
 
-set(BENCH boards/bench_f405/board.c boards/bench_f405/vectors.c boards/f405/settings.c)
-dcmp_board(bench_f405_dac ${BENCH} soc/stm32f4/amplifier_dac.c)
-dcmp_board(bench_f405_pwm ${BENCH} soc/stm32f4/amplifier_pwm.c)
-set(CRYSTAL_HZ 8000000 CACHE STRING "of the board's crystal; 2 MHz has to divide it")
-target_compile_definitions(bench_f405_dac PRIVATE BOARD_NUMBER=3 BOARD_CRYSTAL_HZ=${CRYSTAL_HZ}u)
-target_compile_definitions(bench_f405_pwm PRIVATE BOARD_NUMBER=5 BOARD_CRYSTAL_HZ=${CRYSTAL_HZ}u)
-
-dcmp_board(qemu_f405 boards/qemu_f405/board.c boards/qemu_f405/vectors.c boards/f405/settings.c
-           boards/native/plant_port.c)
-target_include_directories(qemu_f405 PRIVATE boards/native)
-target_compile_definitions(qemu_f405 PRIVATE BOARD_CRYSTAL_HZ=8000000u)
+include(cmake/boards.cmake)
+set(DCMP_BOARDS ${CMAKE_CURRENT_SOURCE_DIR}/boards CACHE PATH "the folder with a folder for each board")
+file(GLOB BOARD_FILES CONFIGURE_DEPENDS ${DCMP_BOARDS}/*/board.h)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BOARD_FILES})
+foreach(file IN LISTS BOARD_FILES)
+  get_filename_component(folder ${file} DIRECTORY)
+  board_read(${folder})
+  dcmp_board(${folder})
+endforeach()

@@ -14,6 +14,7 @@ from dcmp_hil.wire.messages import ParameterGet, ParameterValue, SampleReport, S
 from sim_backend.board.backend import SimBoardBackend
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
+from tools.boards import read_boards, released
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -22,12 +23,16 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Sample
     from dcmp_hil.wire.messages import Parameter
     from tests.target.machine.system import System
+    from tools.boards import Board
 
+BOARDS = read_boards()
+RELEASED = released(BOARDS)
+DAC, PWM = BOARDS["bench_f405_dac"], BOARDS["bench_f405_pwm"]
 STILL = ("model.eta_rad_s2=0.0", "model.eta_amplitude_rad_s2=0.0")  # no disturbance that depends on the time
 CARRIERS = ("cobs", "slcan", "can")
 COUNT_RAD = 2 * math.pi / 4096
 WATCHDOG_US, IWDG_US, FAST_US, TICK_US = 20_000.0, 50_000.0, 2_000.0, 1_000.0
-TICK_IRQ, LINK_IRQ, BREAK_PIN = 29, 6, 12
+TICK_IRQ, LINK_IRQ = 29, 6
 CYCLES_A_MS = 168_000
 CONFIG = {
     "counts_per_rev": 4096, "period_us": 1000, "voltage_limit_mV": 10_000, "slew_mV_per_ms": 0,
@@ -67,21 +72,21 @@ def rung(
     f405: Path,
     carrier: str = "cobs",
     *,
-    kind: str = "dac",
+    board: Board = DAC,
     supply_V: float = 10.0,
     overrides: Sequence[str] = (),
     **options: object,
 ) -> Iterator[Rung]:
     """Arm a board over a carrier; a PWM board has a supply."""
     rig = bench("backend.kind=sim-board", f"backend.carrier={carrier}", *STILL, *overrides)
-    if kind == "pwm":
+    if board.amplifier == "pwm":
         rig = change_rig(rig, [f"amplifier.supply_V={supply_V}"])
         options.setdefault("supply_mV", 1e3 * supply_V)
-    board = TargetBoard(f405 / f"bench_f405_{kind}.elf", rig, carrier, **options)
-    host = SimBoardBackend(rig, SimulatedClock(), board)  # type: ignore[arg-type]
+    target = TargetBoard(f405 / f"{board.name}.elf", rig, carrier, board=board, **options)
+    host = SimBoardBackend(rig, SimulatedClock(), target)  # type: ignore[arg-type]
     host.__enter__()
-    yield Rung(board, host)
-    assert board.system.misuse == []
+    yield Rung(target, host)
+    assert target.system.misuse == []
 
 
 def sine(k: int, sample: Sample) -> float:

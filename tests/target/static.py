@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import fnmatch
 import functools
+import itertools
 import json
 import re
 import subprocess
 from typing import TYPE_CHECKING, NamedTuple
 
 from tests.target.build import FIRMWARE, needed
+from tools.boards import read_boards
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
+    from tools.boards import Board
+
+WHOLE = "bench_f405_dac"  # its program is looked at with the core and the application
 TABLE = FIRMWARE.parent / "docs" / "misra.md"
 
-_CHIP = ("-I", "core", "-I", "app", "-I", "soc/stm32f4", "-I", "boards/f405", "-DBOARD_CRYSTAL_HZ=8000000u")
+_BENCH = "soc/stm32f4/bench"
+_CHIP = ("-I", "core", "-I", "app", "-I", "soc/stm32f4", "-I", _BENCH)
 _WARNINGS = (
     "-Wall",
     "-Wextra",
@@ -49,24 +55,21 @@ def _chip_folder() -> tuple[str, ...]:
     return tuple(f"soc/stm32f4/{file.name}" for file in files if not file.name.startswith("amplifier_"))
 
 
-PROGRAMS = {
-    # whole programs, so that what is asked of one has its answer
-    "bench_f405_dac": Program(
-        ("core", "app", *_chip_folder(), "soc/stm32f4/amplifier_dac.c", "boards/f405", "boards/bench_f405"),
-        (*_CHIP, "-DBOARD_NUMBER=3"),
-    ),
-    "native": Program(
-        ("core", "boards/native"),
-        ("-I", "core", "-I", "boards/native", "-D_XOPEN_SOURCE=700"),
-        for_chip=False,
-    ),
-    # of these only what the others do not have
-    "bench_f405_pwm": Program(
-        ("soc/stm32f4/amplifier_pwm.c", "boards/bench_f405"), (*_CHIP, "-DBOARD_NUMBER=5")
-    ),
-    "qemu_f405": Program(("boards/qemu_f405", "boards/native/plant_port.c"), (*_CHIP, "-I", "boards/native")),
-    "hostlib": Program(("boards/hostlib",), ("-I", "core"), for_chip=False),
-}
+def _of_board(board: Board) -> Program:
+    """Return the files that see a board's data; of the first board all its files."""
+    own = f"boards/{board.name}"
+    options = (*_CHIP, "-I", own)
+    if board.amplifier is None:
+        return Program((own, "boards/native/plant_port.c"), (*options, "-I", "boards/native"))
+    bench = (*_chip_folder(), f"soc/stm32f4/amplifier_{board.amplifier}.c", f"{_BENCH}/bench.c")
+    if board.name == WHOLE:
+        return Program(("core", "app", *bench, _BENCH), options)
+    read = Program(bench, options)
+    data = f"{own}/board.h"
+    return Program(
+        tuple(str(file.relative_to(FIRMWARE)) for file in read.files() if data in _seen_by(file, options)),
+        options,
+    )
 
 
 class Finding(NamedTuple):
@@ -127,6 +130,12 @@ def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Find
     return sorted(found)
 
 
+def _seen_by(file: Path, options: tuple[str, ...]) -> frozenset[str]:
+    """Return the headers of ours that a file sees, compiled with these options."""
+    folders = tuple(after for before, after in itertools.pairwise(options) if before == "-I")
+    return _included(file, folders)
+
+
 @functools.cache
 def _included(file: Path, folders: tuple[str, ...]) -> frozenset[str]:
     """Return the headers of ours that a file sees, those of headers too."""
@@ -142,10 +151,18 @@ def _included(file: Path, folders: tuple[str, ...]) -> frozenset[str]:
 
 def headers(program: Program) -> set[str]:
     """Return the headers that a program includes."""
-    folders = tuple(
-        after for before, after in zip(program.options, program.options[1:], strict=False) if before == "-I"
-    )
-    return set().union(*(_included(file, folders) for file in program.files()))
+    return set().union(*(_seen_by(file, program.options) for file in program.files()))
+
+
+PROGRAMS = {board.name: _of_board(board) for board in read_boards().values()} | {
+    "native": Program(
+        ("core", "boards/native"),
+        ("-I", "core", "-I", "boards/native", "-D_XOPEN_SOURCE=700"),
+        for_chip=False,
+    ),
+    "hostlib": Program(("boards/hostlib",), ("-I", "core"), for_chip=False),
+}
+"""Whole programs, so that what is asked of one has its answer; of the rest what the others do not have."""
 
 
 def everywhere(said: dict[str, list[Finding]]) -> set[Finding]:

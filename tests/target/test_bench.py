@@ -16,7 +16,19 @@ from tests.contract.benches import PatientClock, pumped
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
 from tests.target.machine.system import STACK_TOP_OF_BOARD, System
-from tests.target.rung import CARRIERS, COUNT_RAD, CYCLES_A_MS, STILL, TICK_IRQ, rung, said_of, sine
+from tests.target.rung import (
+    BOARDS,
+    CARRIERS,
+    COUNT_RAD,
+    CYCLES_A_MS,
+    PWM,
+    RELEASED,
+    STILL,
+    TICK_IRQ,
+    rung,
+    said_of,
+    sine,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -122,10 +134,10 @@ def test_tick_costs_a_tenth_of_a_millisecond_at_most(
 # ------------------------------------------------------------------------------------------- the way there
 
 
-@pytest.mark.parametrize("kind", ["dac", "pwm"])
+@pytest.mark.parametrize("board", RELEASED)
 @pytest.mark.parametrize("carrier", CARRIERS)
-def test_nothing_reaches_the_motor_before_it_is_armed(f405: Path, kind: str, carrier: str) -> None:
-    with rung(f405, carrier, kind=kind) as target:
+def test_nothing_reaches_the_motor_before_it_is_armed(f405: Path, board: str, carrier: str) -> None:
+    with rung(f405, carrier, board=BOARDS[board]) as target:
         armed = next(t for t, on, _ in target.system.pins_seen if on)
         assert all(mV == 0.0 for t, on, mV in target.system.pins_seen if t < armed)
         assert armed > 10_000.0  # the tenth DRIVE
@@ -134,7 +146,7 @@ def test_nothing_reaches_the_motor_before_it_is_armed(f405: Path, kind: str, car
 
 
 def test_limits_are_true_at_a_supply_of_24_V(f405: Path) -> None:
-    with rung(f405, kind="pwm", supply_V=24.0) as target:
+    with rung(f405, board=PWM, supply_V=24.0) as target:
         for volts in (-2.5, 10.0, 50.0):
             target.drive(3, lambda *_, volts=volts: volts)
             limited = 1e3 * min(10.0, volts)
@@ -158,7 +170,7 @@ def test_board_without_a_record_never_puts_out_more_than_is_asked_for(f405: Path
 
 
 def test_bridge_turns_either_way(f405: Path) -> None:
-    with rung(f405, kind="pwm") as target:
+    with rung(f405, board=PWM) as target:
         target.drive(3, lambda *_: -2.5)
         assert target.system.amplifier_mV == pytest.approx(-2500.0, abs=2.0)
         target.drive(3, lambda *_: 10.0)

@@ -11,11 +11,11 @@ from dcmp_hil.wire.messages import Parameter, State
 from tests.helpers import bench
 from tests.target.machine.board import TargetBoard
 from tests.target.rung import (
-    BREAK_PIN,
     CARRIERS,
     FAST_US,
     IWDG_US,
     LINK_IRQ,
+    PWM,
     STILL,
     TICK_IRQ,
     TICK_US,
@@ -114,15 +114,15 @@ def test_shove_is_stopped_within_2_ms_of_the_limit(f405: Path, what: str, speed:
 
 
 def test_break_input_cuts_the_bridge_without_software(f405: Path) -> None:
-    with rung(f405, kind="pwm") as target:
+    with rung(f405, board=PWM) as target:
         target.drive(20)
         assert target.system.amplifier_mV > 900.0
-        target.system.gpio["B"].outside &= ~(1 << BREAK_PIN)
+        target.system.wires.drive("BREAK", high=False)
         target.system.pwm.look_at_break()
         assert target.system.amplifier_mV == 0.0  # before a single instruction
         assert target.drive(5)[-1].fault == Fault.BREAK_INPUT
         assert not target.system.enable
-        target.system.gpio["B"].outside |= 1 << BREAK_PIN
+        target.system.wires.drive("BREAK", high=True)
         assert target.drive(5)[-1].fault == Fault.BREAK_INPUT  # until a host clears it
         assert not target.system.enable
 

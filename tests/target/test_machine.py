@@ -58,7 +58,7 @@ MISUSES: dict[str, tuple[Callable[[Bare], object], str]] = {
     ),
     "DAC without its pin": (
         lambda m: m.do((RCC + 0x40, 1 << 29), (RCC + 0x30, 0x0010_0001), (DAC, 1)),
-        "PA4 is not analog",
+        "its pin is not analog",
     ),
     "a baud rate": (
         lambda m: m.do((RCC + 0x44, 1 << 4), (USART1 + 8, 17), (USART1 + 0xC, 1 << 13)), "baud",

@@ -5,6 +5,7 @@
 #include "app.h"
 #include "board.h"
 #include "clock.h"
+#include "handlers.h"
 #include "interrupts.h"
 #include "link_irq.h"
 #include "plant_port.h"
@@ -13,7 +14,6 @@
 #include "startup.h"
 #include "usart.h"
 
-#define BOARD_NUMBER 4
 #define BAUD 1000000u
 #define MS_OF_CLOCK 168000u /* the emulator's, for any value of its registers */
 

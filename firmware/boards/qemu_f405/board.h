@@ -1,13 +1,12 @@
-/* The handlers of this board's vectors. */
+/* The chip in QEMU. The program is in this folder, too: the emulator has no encoder and no amplifier. */
 #ifndef BOARD_H
 #define BOARD_H
 
-#define BOARD_TICK_IRQ 29u /* as on the bench board; here only software asks for it */
+#define BOARD_NUMBER 4
+#define BOARD_CRYSTAL_HZ 8000000u
+#define BOARD_FLASH_KIB 1024u
+#define BOARD_RAM_KIB 128u
 
-void board_tick(void);
-void board_link(void);
-void board_serial(void);
-void board_plant(void);
-void board_nmi(void);
+#define BOARD_ENABLE PB15
 
 #endif

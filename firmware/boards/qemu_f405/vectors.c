@@ -1,5 +1,5 @@
 /* Where the processor goes. What is missing here leads to HardFault, and so to an end. */
-#include "board.h"
+#include "handlers.h"
 #include "link_irq.h"
 #include "startup.h"
 #include "usart.h"

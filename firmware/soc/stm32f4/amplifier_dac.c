@@ -1,6 +1,7 @@
-/* An analogue amplifier behind DAC channel 1 (PA4) and a stage that makes it bipolar. */
+/* An analogue amplifier behind DAC channel 1 and a stage that makes it bipolar. */
 #include "amplifier.h"
 #include "amplifier_enable.h"
+#include "board.h"
 
 #define CODE_MAX 4095
 #define HALF 2048
@@ -29,9 +30,9 @@ void amplifier_hold(void)
 void amplifier_start(const struct clock *clock, const struct amplifier_scale *scale)
 {
     (void)clock;
-    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->AHB1ENR, pin_clock(BOARD_DAC));
     clock_enable(&RCC->APB1ENR, RCC_APB1ENR_DACEN);
-    pin_set_up(GPIOA, 4u, PIN_ANALOG, PIN_FLOATS, 0u);
+    pin_set_up(BOARD_DAC, PIN_ANALOG, PIN_FLOATS, 0u);
     write_code(scale->zero_code);
     DAC->CR = DAC_CR_EN1;
 }

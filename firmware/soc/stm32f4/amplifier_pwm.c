@@ -1,20 +1,18 @@
-/* An H-bridge: TIM1's duty cycle (PA8), a direction (PB14), and the bridge's own failure line (PB12, low), which stops
- * the timer's output without any software. */
+/* An H-bridge: TIM1's duty cycle, a direction, and the bridge's own failure line (low), which stops the timer's output
+ * without any software. */
 #include "amplifier.h"
 #include "amplifier_enable.h"
+#include "board.h"
 
 #define FREQUENCY_HZ 20000u
 #define TIMER 1u /* alternate function */
-#define PWM_PIN 8u
-#define DIRECTION_PIN 14u
-#define BREAK_PIN 12u
 #define LOCK_MOST 3u /* break, idle states, polarities, modes: until the next reset no program changes them, MOE alone */
 
 static void write_duty(int32_t part, int32_t whole)
 {
     const int32_t size = part < 0 ? -part : part;
     const uint32_t period = TIM1->ARR + 1u;
-    pin_write(GPIOB, DIRECTION_PIN, part < 0);
+    pin_write(BOARD_DIRECTION, part < 0);
     TIM1->CCR1 = size < whole ? (uint32_t)size * period / (uint32_t)whole : period;
 }
 
@@ -31,10 +29,10 @@ void amplifier_hold(void)
 void amplifier_start(const struct clock *clock, const struct amplifier_scale *scale)
 {
     (void)scale;
-    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->AHB1ENR, pin_clock(BOARD_PWM) | pin_clock(BOARD_DIRECTION) | pin_clock(BOARD_BREAK));
     clock_enable(&RCC->APB2ENR, RCC_APB2ENR_TIM1EN);
-    pin_set_up(GPIOB, BREAK_PIN, PIN_ALTERNATE, PIN_UP, TIMER); /* first: a pin that is not connected is a break */
-    pin_set_up(GPIOB, DIRECTION_PIN, PIN_OUTPUT, PIN_FLOATS, 0u);
+    pin_set_up(BOARD_BREAK, PIN_ALTERNATE, PIN_UP, TIMER); /* first: a pin that is not connected is a break */
+    pin_set_up(BOARD_DIRECTION, PIN_OUTPUT, PIN_FLOATS, 0u);
     TIM1->ARR = clock->apb2_timers_Hz / FREQUENCY_HZ - 1u;
     TIM1->CCMR1 = (TIM_CCMR1_OC1M_PWM1 << TIM_CCMR1_OC1M_POS) | TIM_CCMR1_OC1PE;
     TIM1->CCER = TIM_CCER_CC1E;
@@ -43,7 +41,7 @@ void amplifier_start(const struct clock *clock, const struct amplifier_scale *sc
     TIM1->EGR = TIM_EGR_UG;
     TIM1->SR = 0;
     TIM1->CR1 = TIM_CR1_ARPE | TIM_CR1_CEN;
-    pin_set_up(GPIOA, PWM_PIN, PIN_ALTERNATE, PIN_DOWN, TIMER);
+    pin_set_up(BOARD_PWM, PIN_ALTERNATE, PIN_DOWN, TIMER);
 }
 
 void amplifier_off(const struct amplifier_scale *scale)
@@ -56,7 +54,7 @@ void amplifier_off(const struct amplifier_scale *scale)
 void amplifier_on(const struct amplifier_scale *scale, int16_t voltage_mV)
 {
     write_duty(voltage_mV, scale->full_scale_mV);
-    if (!pin_written(GPIOB, ENABLE_PIN)) { /* only when it begins: what stopped the timer stays stopped */
+    if (!pin_written(BOARD_ENABLE)) { /* only when it begins: what stopped the timer stays stopped */
         TIM1->BDTR |= TIM_BDTR_MOE;
         enable_high();
     }
@@ -64,7 +62,7 @@ void amplifier_on(const struct amplifier_scale *scale, int16_t voltage_mV)
 
 bool amplifier_broken(void)
 {
-    const bool broken = (TIM1->SR & TIM_SR_BIF) != 0u || !pin_read(GPIOB, BREAK_PIN);
+    const bool broken = (TIM1->SR & TIM_SR_BIF) != 0u || !pin_read(BOARD_BREAK);
     TIM1->SR = TIM1_SR_ALL & ~TIM_SR_BIF;
     return broken;
 }

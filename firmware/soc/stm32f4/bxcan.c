@@ -1,5 +1,6 @@
 #include "bxcan.h"
 
+#include "board.h"
 #include "clock.h"
 #include "pins.h"
 #include "regs.h"
@@ -62,10 +63,10 @@ static void let_in(const uint16_t *ids, uint32_t count)
 bool bxcan_start(uint32_t bus_Hz, const uint16_t *ids, uint32_t count)
 {
     const uint32_t timing = bit_timing(bus_Hz);
-    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOBEN);
+    clock_enable(&RCC->AHB1ENR, pin_clock(BOARD_CAN_RX) | pin_clock(BOARD_CAN_TX));
     clock_enable(&RCC->APB1ENR, RCC_APB1ENR_CAN1EN);
-    pin_set_up(GPIOB, 8u, PIN_ALTERNATE, PIN_UP, CAN);
-    pin_set_up(GPIOB, 9u, PIN_ALTERNATE, PIN_FLOATS, CAN);
+    pin_set_up(BOARD_CAN_RX, PIN_ALTERNATE, PIN_UP, CAN);
+    pin_set_up(BOARD_CAN_TX, PIN_ALTERNATE, PIN_FLOATS, CAN);
     CAN1->MCR = CAN_MCR_INRQ | CAN_MCR_TXFP | CAN_MCR_ABOM | CAN_MCR_DBF;
     if (timing == 0u || !wait_for_init(true)) {
         return false;

@@ -12,7 +12,7 @@
 #define BXCAN_SCE_IRQ 22u
 #define BXCAN_FIFO 3u /* frames that wait at most */
 
-/* PB8 and PB9. Only frames with one of the identifiers get in. False if the bus clock has no such bit rate, or the
+/* Only frames with one of the identifiers get in. False if the bus clock has no such bit rate, or the
  * controller does not answer. */
 bool bxcan_start(uint32_t bus_Hz, const uint16_t *ids, uint32_t count);
 

@@ -7,27 +7,27 @@ static void put(volatile uint32_t *at, uint32_t width, uint32_t place, uint32_t 
     *at = (*at & ~mask) | (value << shift);
 }
 
-void pin_set_up(struct gpio *port, uint32_t pin, enum pin_mode mode, enum pin_pull pull, uint32_t function)
+void port_set_up(struct gpio *port, uint32_t number, enum pin_mode mode, enum pin_pull pull, uint32_t function)
 {
-    put(&port->PUPDR, 2u, pin, (uint32_t)pull);
+    put(&port->PUPDR, 2u, number, (uint32_t)pull);
     if (mode == PIN_ALTERNATE) { /* before the mode, so that no other function is on the pin for a moment */
-        put(pin < 8u ? &port->AFRL : &port->AFRH, 4u, pin & 7u, function);
+        put(number < 8u ? &port->AFRL : &port->AFRH, 4u, number & 7u, function);
     }
-    put(&port->MODER, 2u, pin,
+    put(&port->MODER, 2u, number,
         mode == PIN_OUTPUT ? 1u : (mode == PIN_ALTERNATE ? 2u : (mode == PIN_ANALOG ? 3u : 0u)));
 }
 
-void pin_write(struct gpio *port, uint32_t pin, bool high)
+void port_write(struct gpio *port, uint32_t number, bool high)
 {
-    port->BSRR = high ? BIT(pin) : BIT(pin + 16u);
+    port->BSRR = high ? BIT(number) : BIT(number + 16u);
 }
 
-bool pin_read(const struct gpio *port, uint32_t pin)
+bool port_read(const struct gpio *port, uint32_t number)
 {
-    return (port->IDR & BIT(pin)) != 0u;
+    return (port->IDR & BIT(number)) != 0u;
 }
 
-bool pin_written(const struct gpio *port, uint32_t pin)
+bool port_written(const struct gpio *port, uint32_t number)
 {
-    return (port->ODR & BIT(pin)) != 0u;
+    return (port->ODR & BIT(number)) != 0u;
 }

@@ -1,5 +1,6 @@
 #include "quadrature.h"
 
+#include "board.h"
 #include "clock.h"
 #include "pins.h"
 #include "regs.h"
@@ -10,10 +11,10 @@
 
 void quadrature_start(void)
 {
-    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->AHB1ENR, pin_clock(BOARD_ENCODER_A) | pin_clock(BOARD_ENCODER_B));
     clock_enable(&RCC->APB1ENR, RCC_APB1ENR_TIM2EN);
-    pin_set_up(GPIOA, 0u, PIN_ALTERNATE, PIN_UP, ENCODER); /* many encoders have open collectors */
-    pin_set_up(GPIOA, 1u, PIN_ALTERNATE, PIN_UP, ENCODER);
+    pin_set_up(BOARD_ENCODER_A, PIN_ALTERNATE, PIN_UP, ENCODER); /* many encoders have open collectors */
+    pin_set_up(BOARD_ENCODER_B, PIN_ALTERNATE, PIN_UP, ENCODER);
     TIM2->CCMR1 = (TIM_CCMR_S_OWN << TIM_CCMR1_CC1S_POS) | (FILTER << TIM_CCMR1_IC1F_POS) |
                   (TIM_CCMR_S_OWN << TIM_CCMR1_CC2S_POS) | (FILTER << TIM_CCMR1_IC2F_POS);
     TIM2->CCMR2 = TIM_CCMR_S_TRC << TIM_CCMR2_CC3S_POS;

@@ -8,7 +8,7 @@
 
 #include "dcmp_device.h"
 
-/* PA0 and PA1. After timebase_start, before timebase_start_ticks. */
+/* After timebase_start, before timebase_start_ticks. */
 void quadrature_start(void);
 
 /* The count at the newest tick. */

@@ -35,7 +35,6 @@ struct rcc {
 #define RCC_CIR_CSSF BIT(7)
 #define RCC_CIR_CSSC BIT(23)
 #define RCC_AHB1ENR_GPIOAEN BIT(0)
-#define RCC_AHB1ENR_GPIOBEN BIT(1)
 #define RCC_APB1ENR_TIM2EN BIT(0)
 #define RCC_APB1ENR_TIM3EN BIT(1)
 #define RCC_APB1ENR_TIM5EN BIT(3)
@@ -94,6 +93,11 @@ struct gpio {
 };
 #define GPIOA ((struct gpio *)0x40020000u)
 #define GPIOB ((struct gpio *)0x40020400u)
+#define GPIOC ((struct gpio *)0x40020800u)
+#define GPIOD ((struct gpio *)0x40020C00u)
+#define GPIOE ((struct gpio *)0x40021000u)
+#define GPIOF ((struct gpio *)0x40021400u)
+#define GPIOG ((struct gpio *)0x40021800u)
 
 /* ------------------------------------------------------------------------------------------ timers */
 

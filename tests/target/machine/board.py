@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from sim_backend.board.config import board_config
 from sim_backend.board.plant_io import PlantIO
 from tests.target.machine.system import System
+from tools.boards import read_boards
 from tools.record import RecordLink, image, record
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.values import Truth
     from tests.target.machine.ports import Frame
+    from tools.boards import Board
 
-_BOARD_NUMBER = 3
 _DAC_MV = 10_000
 _SAID_US = 600.0  # by then it has said what there is to say of a tick
 _SIGN_BIT = 1 << 31
@@ -34,17 +35,22 @@ class TargetBoard:
         Whose record it has, and whose plant.
     carrier
         `cobs`, `slcan` or `can`.
+    board
+        Whose wires and number it has; None: the board of firmware/boards that the program is named after.
     options
         Of System.
     """
 
-    def __init__(self, elf: Path, rig: Rig, carrier: str = "cobs", **options: object) -> None:
+    def __init__(
+        self, elf: Path, rig: Rig, carrier: str = "cobs", *, board: Board | None = None, **options: object
+    ) -> None:
+        board = board or read_boards()[elf.stem]
         kept = record(
-            board_config(rig, _BOARD_NUMBER),
+            board_config(rig, board.number),
             link=RecordLink[carrier],
             full_scale_mV=rig.amplifier.supply_mV or _DAC_MV,
         )
-        self.system = System(elf, image(kept), **options)  # type: ignore[arg-type]
+        self.system = System(elf, image(kept), board=board, **options)  # type: ignore[arg-type]
         self.pins = PlantIO(rig)
         self.carrier = carrier
         self.period_us = 1e6 * rig.period

@@ -9,7 +9,7 @@ from tests.target.machine.block import Block
 if TYPE_CHECKING:
     from tests.target.machine.system import System
 
-HSI_HZ, HSE_HZ = 16e6, 8e6
+HSI_HZ = 16e6
 _HSE_US, _PLL_US, _FLASH_WORD_US, _FLASH_ERASE_US = 2000.0, 100.0, 16.0, 250_000.0
 _STEP_HZ = 30e6  # of the flash, a wait state each
 _DIVIDE_AHB = {8: 2, 9: 4, 10: 8, 11: 16, 12: 64, 13: 128, 14: 256, 15: 512}
@@ -37,12 +37,12 @@ class Rcc(Block):
     def core_Hz(self) -> float:  # noqa: N802
         """Return the processor's clock."""
         source = self.field("CFGR", 2, 2)
-        hz = {0: HSI_HZ, 1: HSE_HZ}.get(source) or self.pll_Hz()
+        hz = {0: HSI_HZ, 1: self.system.board.crystal_Hz}.get(source) or self.pll_Hz()
         return hz / _DIVIDE_AHB.get(self.field("CFGR", 4, 4), 1)
 
     def pll_Hz(self) -> float:  # noqa: N802
         """Return the PLL's output."""
-        source = HSE_HZ if self.flag("PLLCFGR", 22) else HSI_HZ
+        source = self.system.board.crystal_Hz if self.flag("PLLCFGR", 22) else HSI_HZ
         entry = source / max(self.field("PLLCFGR", 0, 6), 1)
         vco = entry * self.field("PLLCFGR", 6, 9)
         if not 0.95e6 <= entry <= 2.1e6 or not 100e6 <= vco <= 432e6:

@@ -51,8 +51,8 @@ class Usart(Block):
 
     def _arrive(self) -> None:
         byte = self._coming.popleft()
-        pins = self.system.gpio["A"]
-        on = self.flag("CR1", 13) and self.flag("CR1", 2) and pins.function(10) == 7 and self.is_clocked()
+        led = self.system.wires.leads("SERIAL_RX")
+        on = led and self.flag("CR1", 13) and self.flag("CR1", 2) and self.is_clocked()
         if on:
             if self.flag("SR", 5):
                 self.raise_flag("SR", 3)  # overrun: the one before was not read
@@ -82,7 +82,7 @@ class Usart(Block):
         """Send a byte."""
         if not self.flag("SR", 7):
             self.misuse("DR is written before TXE")
-        if self.system.gpio["A"].function(9) == 7 and self.flag("CR1", 13) and self.flag("CR1", 3):
+        if self.system.wires.leads("SERIAL_TX") and self.flag("CR1", 13) and self.flag("CR1", 3):
             self.drop_flag("SR", 7)
             self.system.after(self._byte_us(), lambda: self._gone(value))
         return 0
@@ -108,8 +108,8 @@ class Dac(Block):
     CLOCK: tuple[str, int] | None = ("APB1ENR", 29)
 
     def code(self) -> int | None:
-        """Return what is on PA4; None where nothing is."""
-        on = self.flag("CR", 0) and self.is_clocked() and self.system.gpio["A"].mode(4) == 3
+        """Return what is on its pin; None where nothing is."""
+        on = self.flag("CR", 0) and self.is_clocked() and self.system.wires.is_analog("DAC")
         return self.now["DHR12R1"] if on else None
 
     def write_DHR12R1(self, value: int, _: int) -> int:  # noqa: N802
@@ -121,8 +121,8 @@ class Dac(Block):
     def write_CR(self, value: int, _: int) -> int:  # noqa: N802
         """Switch the block on."""
         self.now["CR"] = value
-        if value & 1 and self.system.gpio["A"].mode(4) != 3:
-            self.misuse("it is switched on while PA4 is not analog")
+        if value & 1 and not self.system.wires.is_analog("DAC"):
+            self.misuse("it is switched on while its pin is not analog")
         self.system.look_at_pins()
         return value
 
@@ -224,7 +224,7 @@ class Can(Block):
             return
         data = self.now[f"TDL{box}R"].to_bytes(4, "little") + self.now[f"TDH{box}R"].to_bytes(4, "little")
         frame = (self.now[f"TI{box}R"] >> 21, data[: self.now[f"TDT{box}R"] & 0xF])
-        led = self.system.gpio["B"].function(9) == 9 and self.system.gpio["B"].function(8) == 9
+        led = self.system.wires.leads("CAN_RX") and self.system.wires.leads("CAN_TX")
         if led and self.on_sent(frame):
             self._empty(box, well=True)
         self._next()

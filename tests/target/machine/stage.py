@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from tests.target.machine.system import System
 
-_ENABLE, _DIRECTION, _PWM = 15, 14, 8
-
 
 class Stage:
     """The amplifier of either kind of board.
@@ -29,15 +27,15 @@ class Stage:
     @property
     def enable(self) -> bool:
         """The level of ENABLE; its resistor pulls it down."""
-        return self._system.gpio["B"].level(_ENABLE)
+        return self._system.wires.level("ENABLE")
 
     @property
     def input_mV(self) -> float:
         """What stands before the gate: full negative where the DAC's pin is not driven."""
         system = self._system
         if system.pwm.is_clocked():
-            sign = -1.0 if system.gpio["B"].level(_DIRECTION) else 1.0
-            led = system.gpio["A"].function(_PWM) == 1
+            sign = -1.0 if system.wires.level("DIRECTION") else 1.0
+            led = system.wires.leads("PWM")
             return sign * system.pwm.duty() * self._supply_mV * led
         code = system.dac.code()
         return -self._full_scale_mV if code is None else (code - 2048) * self._full_scale_mV / 2048

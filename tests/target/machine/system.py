@@ -25,12 +25,15 @@ from tests.target.machine.memory import FLASH, FLASH_BYTES, blank, lay_out, lose
 from tests.target.machine.ports import Can, Dac, Usart
 from tests.target.machine.stage import Stage
 from tests.target.machine.timers import EncoderTimer, PwmTimer, Timer
+from tests.target.machine.wires import Wires
+from tools.boards import read_boards
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from tests.target.machine.block import Block
+    from tools.boards import Board
 
 _EMULATOR: Any = unicorn  # its functions have no types
 STACK_TOP_OF_BOARD = 0x2000_1000
@@ -58,14 +61,17 @@ class System:
         Count every instruction, one by one, instead of taking them from the length of a block.
     supply_mV, full_scale_mV
         mV: the motor's supply of a bridge; what 2048 codes of the DAC are behind the outer stage.
+    board
+        Whose wires it has; None: the board of firmware/boards that the program is named after.
     """
 
     def __init__(
         self, elf: Path, record: bytes = b"", *, crystal: bool = True, lsi_hz: float = 32_000.0,
         preempt: int | None = None, exact: bool = False, supply_mV: float = 10_000.0,
-        full_scale_mV: float = 10_000.0,
+        full_scale_mV: float = 10_000.0, board: Board | None = None,
     ) -> None:  # fmt: skip
         self.lsi_hz = lsi_hz
+        self.board = board or read_boards()[elf.stem]
         self.stage = Stage(self, supply_mV=supply_mV, full_scale_mV=full_scale_mV)
         self.chance = random.Random(preempt) if preempt is not None else None
         self.exact = exact
@@ -87,8 +93,9 @@ class System:
         self.cpu = Cpu(self.uc, self)
         self.rcc = Rcc(self, crystal=crystal)
         self.flash, self.iwdg, self.pwr = Flash(self), Iwdg(self), Pwr(self)
-        self.gpio = {letter: Gpio(self, f"GPIO{letter}") for letter in "AB"}
-        self.gpio["B"].outside = 1 << 12  # the bridge's failure line rests high
+        self.gpio = {letter: Gpio(self, f"GPIO{letter}") for letter in "ABCDEFG"}
+        self.wires = Wires(self.board, self.gpio)
+        self.wires.drive("BREAK", high=True)  # the bridge's failure line rests high
         self.timers: dict[str, Timer] = {name: Timer(self, name) for name in ("TIM3", "TIM5")}
         self.encoder, self.pwm = EncoderTimer(self, "TIM2"), PwmTimer(self)
         self.timers |= {"TIM2": self.encoder, "TIM1": self.pwm}

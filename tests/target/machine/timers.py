@@ -144,8 +144,7 @@ class EncoderTimer(Timer):
 
     def turn(self, to: int) -> None:
         """Let the encoder come to this count of its own, edge by edge."""
-        pins = self.system.gpio["A"]
-        led = pins.function(0) == 1 and pins.function(1) == 1
+        led = self.system.wires.leads("ENCODER_A") and self.system.wires.leads("ENCODER_B")
         inputs = self.source(1) == 1 and self.field("CCMR1_Output", 8, 2) == 1
         before, self._world = self._world, to
         if before is None or before == to:
@@ -173,14 +172,14 @@ class PwmTimer(Timer):
         super().__init__(system, "TIM1")
 
     def duty(self) -> float:
-        """Return the part of the time that PA8 is high."""
+        """Return the part of the time that the output is high."""
         mode = self.field("CCMR1_Output", 4, 3)
         driven = self.flag("BDTR", 15) and self.flag("CCER", 0) and self.flag("CR1", 0) and mode == 6
         return min(self.now["CCR1"] / (self.now["ARR"] + 1), 1.0) if driven else 0.0
 
     def _broken(self) -> bool:
-        pins = self.system.gpio["B"]
-        level = bool(pins.outside >> 12 & 1) if pins.function(12) == 1 else False
+        wires = self.system.wires
+        level = wires.leads("BREAK") and wires.outside("BREAK")
         return self.flag("BDTR", 12) and level == self.flag("BDTR", 13)
 
     def look_at_break(self) -> None:

@@ -1,4 +1,4 @@
-/* What a board with this chip is built with, and what its record in flash memory says. */
+/* What a board is built with, and what its record in flash memory says. */
 #ifndef SETTINGS_H
 #define SETTINGS_H
 

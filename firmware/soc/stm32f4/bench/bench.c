@@ -1,13 +1,14 @@
-/* The bench board: an STM32F405 with an encoder, an amplifier, and a host on USART 1 or CAN 1. README.md has the pins.
+/* The program of a board with an STM32F405, an encoder, an amplifier, and a host on USART 1 or CAN 1; board.h has the
+ * pins.
  *
  * The tick, the link and CAN's interrupts share one priority, so that nothing interrupts the core; only the byte port's is
  * above it. The main loop sleeps, and feeds the watchdog. */
-#include "board.h"
-
 #include "amplifier.h"
 #include "app.h"
+#include "board.h"
 #include "bxcan.h"
 #include "clock.h"
+#include "handlers.h"
 #include "interrupts.h"
 #include "link_irq.h"
 #include "pins.h"
@@ -193,11 +194,11 @@ void board_hold(void)
 
 static void start_serial(void)
 {
-    clock_enable(&RCC->AHB1ENR, RCC_AHB1ENR_GPIOAEN);
+    clock_enable(&RCC->AHB1ENR, pin_clock(BOARD_SERIAL_TX) | pin_clock(BOARD_SERIAL_RX));
     clock_enable(&RCC->APB2ENR, RCC_APB2ENR_USART1EN);
     usart_start(USART1, board.clock.apb2_Hz, board.settings.baud);
-    pin_set_up(GPIOA, 9u, PIN_ALTERNATE, PIN_FLOATS, SERIAL_FUNCTION);
-    pin_set_up(GPIOA, 10u, PIN_ALTERNATE, PIN_UP, SERIAL_FUNCTION);
+    pin_set_up(BOARD_SERIAL_TX, PIN_ALTERNATE, PIN_FLOATS, SERIAL_FUNCTION);
+    pin_set_up(BOARD_SERIAL_RX, PIN_ALTERNATE, PIN_UP, SERIAL_FUNCTION);
 }
 
 static void start_can(void)

@@ -1,6 +1,6 @@
-/* The handlers of this board's vectors. */
-#ifndef BOARD_H
-#define BOARD_H
+/* The handlers of this program's vectors. */
+#ifndef HANDLERS_H
+#define HANDLERS_H
 
 void board_tick(void);
 void board_link(void);

@@ -1,6 +1,6 @@
 /* Where the processor goes. What is missing here leads to HardFault, and so to an end. */
-#include "board.h"
 #include "bxcan.h"
+#include "handlers.h"
 #include "link_irq.h"
 #include "startup.h"
 #include "timebase.h"
