@@ -9,8 +9,7 @@ from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.stage_factory import controller_of, observer_of
 from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import controllers
-from dcmp_hil.control.controllers.pd_compensated import PdSettings
-from dcmp_hil.control.observers.friction_feedforward import KnownFriction
+from dcmp_hil.control.friction_feedforward import FrictionFeedforward
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import Predictor
 from dcmp_hil.control.trajectory import Trajectory
@@ -69,7 +68,7 @@ def assemble(
     """
     backend = open_backend(rig, clock, faults, clear=clear)
     trajectory = Trajectory(rig.reference.source(), rig.reference.soft_start_s)
-    observer, controller = make_observer(rig, trajectory), make_controller(rig)
+    observer, controller = make_observer(rig), make_controller(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,
         ReferenceAligner(trajectory.at, rig.delay, lambda: trajectory.began),
@@ -111,17 +110,19 @@ def assemble(
         clock=clock,
         delay=rig.delay,
         changes=changes or NoChanges(),
+        friction=make_friction(rig),
     )
     return stages, recorder
 
 
-def make_observer(rig: Rig, trajectory: Trajectory) -> Observer:
-    """Make the observer that `[observer]` asks for, told of friction if `[controller]` says so."""
-    context = rig.observer_context
-    observer = observer_of(rig.observer, context, rig.plugin_folders)
-    if isinstance(rig.controller, PdSettings) and rig.controller.friction_feedforward:
-        return KnownFriction(observer, context, trajectory.at, rig.delay)
-    return observer
+def make_observer(rig: Rig) -> Observer:
+    """Make the observer that `[observer]` asks for."""
+    return observer_of(rig.observer, rig.observer_context, rig.plugin_folders)
+
+
+def make_friction(rig: Rig) -> FrictionFeedforward | None:
+    """Make what takes friction from the observer, if `[controller]` asks for it."""
+    return FrictionFeedforward(rig.model.values()) if rig.controller.feeds_friction_forward else None
 
 
 def make_controller(rig: Rig) -> Controller:

@@ -13,6 +13,7 @@ from dcmp_hil.values import Cycle, Timing
 if TYPE_CHECKING:
     from dcmp_hil.backend import Backend
     from dcmp_hil.control.controllers import Controller
+    from dcmp_hil.control.friction_feedforward import FrictionFeedforward
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.control.predictor import Predictor
     from dcmp_hil.live.live_changes import Changes
@@ -102,6 +103,7 @@ class LoopStages:
     clock: Clock
     delay: float  # s, from a sample to the instant at which its command acts
     changes: Changes = field(default_factory=NoChanges)
+    friction: FrictionFeedforward | None = None
 
 
 def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
@@ -138,8 +140,8 @@ def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
     trajectory, controller, supervisor, telemetry = (
         stages.trajectory, stages.controller, stages.supervisor, stages.telemetry,
     )  # fmt: skip
-    deadline_monitor, clock, delay, changes = (
-        stages.deadline_monitor, stages.clock, stages.delay, stages.changes,
+    deadline_monitor, clock, delay, changes, friction = (
+        stages.deadline_monitor, stages.clock, stages.delay, stages.changes, stages.friction,
     )  # fmt: skip
     previous, first = math.nan, math.nan
 
@@ -149,7 +151,9 @@ def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
             sample = backend.read()
         t = sample.t
         arrived = clock.now_ns() * 1e-9
-        estimate = observer.update(sample)
+        told = sample if friction is None else friction.told(sample, trajectory.velocity(friction.middle(t)))
+        rest = observer.update(told)
+        estimate = rest if friction is None else friction.whole(rest, trajectory.velocity(t + delay))
         if first != first:
             first = arrived - t
             trajectory.hold(estimate.position)

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from dcmp_hil import run
-from dcmp_hil.assembly import make_controller, make_observer
+from dcmp_hil.assembly import make_controller, make_friction, make_observer
 from dcmp_hil.control.controllers import ControllerContext
 from dcmp_hil.control.model import Model
 from dcmp_hil.control.observers import ObserverContext
-from dcmp_hil.control.observers.friction_feedforward import KnownFriction
 from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
-from dcmp_hil.control.references.periodic import Sine
-from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins.checked import CheckedController, CheckedObserver
 from tests.helpers import STEADY, bench, figures, known, named
@@ -39,13 +36,18 @@ class _Mine:
 
 
 def _observer(*overrides: str) -> Observer:
-    return make_observer(bench(*overrides), Trajectory(Sine(), 2.0))
+    return make_observer(bench(*overrides))
 
 
 def test_observer_is_the_one_that_the_rig_names() -> None:
     assert isinstance(_observer(), SuperTwisting)
     assert isinstance(_observer("observer.kind=paper"), PaperObserver)
-    assert isinstance(_observer("controller.friction_feedforward=true"), KnownFriction)
+
+
+def test_friction_is_fed_forward_where_the_controller_asks_for_it() -> None:
+    assert make_friction(bench()) is None
+    assert make_friction(bench("controller.friction_feedforward=true")) is not None
+    assert make_friction(bench(f"controller.kind={named(_Mine)}")) is None
 
 
 def test_observer_of_ones_own_gets_its_setting_and_its_options() -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from dcmp_hil import loop, run
+from dcmp_hil.control.friction_feedforward import FrictionFeedforward
+from dcmp_hil.control.model import Model
 from dcmp_hil.errors import TripError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.safety.outlier_filter import OutlierFilter
@@ -137,6 +141,27 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     cycle: Cycle = given[11][0]
     assert cycle[:5] == (sample, estimate, reference, 5.0, 6.0)
     assert stages.timings[1] == cycle.timing
+
+
+def test_loop_hands_the_velocities_of_the_reference_to_the_friction_that_is_fed_forward() -> None:
+    stages, line = _stages()
+    asked = []
+
+    def velocity(t: float) -> float:
+        asked.append(t)
+        return 1.0  # rad/s, beyond the ramp of the sign
+
+    at = line.trajectory.at
+    trajectory = SimpleNamespace(at=at, velocity=velocity, hold=lambda _: None, begin=lambda _, __: None)
+    feedforward = FrictionFeedforward(Model(f1=1.3, ku=5.4))
+    loop.run(replace(line, trajectory=trajectory, friction=feedforward), _SAMPLES[1].t, _Stop())  # type: ignore[arg-type]
+    first, second = _SAMPLES[:2]
+    assert asked[2:] == [0.5 * (first.t + second.t), second.t + 0.001]  # in the middle, and when it acts
+    told = [arguments[0] for name, arguments in stages.calls if name == "update"][2]
+    assert told == second._replace(voltage=second.voltage - 1.3 * (1.0 / 5.4))
+    cycle = [arguments[0] for name, arguments in stages.calls if name == "record"][1]
+    assert cycle.sample == second  # as it was read
+    assert cycle.estimate == Estimate(second.position, 0.0, -1.3)
 
 
 def test_loop_times_its_periods() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -199,3 +199,5 @@ class CustomController(Custom):
 
     position: Literal["estimated", "measured"] = "estimated"
     """Position that the controller gets: x1_hat (quiet) or the encoder's."""
+
+    feeds_friction_forward: ClassVar[bool] = False

@@ -90,6 +90,10 @@ class Trajectory:
         left = bridge.at(t)
         return Reference(x + left.position, v + left.velocity, a + left.acceleration)
 
+    def velocity(self, t: float) -> float:
+        """Return the velocity of the reference at device time `t`, rad/s."""
+        return self.at(t).velocity
+
     def _unbridged(self, t: float) -> Reference:
         if not t < math.inf:  # NaN in, NaN out: the supervisor finds it in the demand
             return Reference(math.nan, math.nan, math.nan)

@@ -9,8 +9,6 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.assembly import make_observer
-from dcmp_hil.control.references.periodic import Sine
-from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins.named_class import find_named
 from dcmp_hil.plugins.roles import OBSERVER
@@ -87,7 +85,7 @@ def test_rig_file_finds_its_class_from_any_folder(
     monkeypatch.chdir(tmp_path)
     rig = load_rig("lab/rig.toml")
     monkeypatch.chdir(elsewhere)
-    observer = make_observer(rig, Trajectory(Sine(), 2.0))
+    observer = make_observer(rig)
     assert observer.inner.gain == 3.0  # type: ignore[attr-defined]
 
 

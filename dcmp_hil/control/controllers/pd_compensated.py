@@ -40,6 +40,11 @@ class PdSettings(ControllerSettings):
             context, kp=self.kp_1_s2, kd=self.kd_1_s, compensate=self.kind == "pd_compensated"
         )
 
+    @property
+    def feeds_friction_forward(self) -> bool:
+        """Whether the friction of `[model]` is a known input of the observer."""
+        return self.friction_feedforward
+
     @classmethod
     def tunable(cls) -> tuple[str, ...]:
         """Return the keys that may change in a run; the two kinds are one class, so `kind` is among them."""

@@ -40,6 +40,11 @@ class ControllerSettings(Section, ABC):
         """Numbers to which the controller's `gains` are ramped in a run; None if it has none."""
         return None
 
+    @property
+    def feeds_friction_forward(self) -> bool:
+        """Whether the friction of `[model]` is a known input of the observer."""
+        return False
+
     def warning(self) -> str:
         """Return a warning of settings that are valid and rarely intended; empty without one."""
         return ""
