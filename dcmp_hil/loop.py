@@ -44,6 +44,10 @@ class TrajectoryStage(Protocol):
         """Return the reference at device time `t` (s)."""
         ...
 
+    def velocity(self, t: float) -> float:
+        """Return the velocity of the reference at device time `t` (s), rad/s; a recording's own is planned."""
+        ...
+
 
 class SupervisorStage(Protocol):
     """Protocol of the last word: `dcmp_hil.safety.supervisor.Supervisor`, or that of a recording."""

@@ -161,9 +161,7 @@ def test_every_key_that_a_kind_calls_tunable_can_change_in_a_run(table: str, tmp
         rig = bench(f"{table}.kind={kind}", *needed)
         assert [f"{table}.{key}" for key in keys] == [key for key in settable(rig) if key.startswith(table)]
         if keys and table == "observer":
-            assert callable(
-                getattr(make_observer(rig), "retune", None)
-            )
+            assert callable(getattr(make_observer(rig), "retune", None))
         if keys and table == "controller":
             assert isinstance(make_controller(rig).gains, tuple)  # type: ignore[attr-defined]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dcmp_hil import loop
-from dcmp_hil.assembly import make_controller, make_observer, make_predictor
+from dcmp_hil.assembly import make_controller, make_friction, make_observer, make_predictor
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
@@ -96,7 +96,7 @@ def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
 
 def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexecution:
     backend, outcomes = ReplayBackend(recorded.rows), Outcomes()
-    observer, controller = make_observer(rig, trajectory), make_controller(rig)
+    observer, controller = make_observer(rig), make_controller(rig)
     mailbox = Mailbox()
     changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_ignore_event)
     made = changes_in(recorded.events, rig, whole=not recorded.damage)
@@ -113,6 +113,7 @@ def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexe
         clock=SimulatedClock(),
         delay=rig.delay,
         changes=RepeatedChanges(made, mailbox, changes),
+        friction=make_friction(rig),
     )
     _run(stages, backend, [event.t for event in recorded.events if event.kind is EventKind.LOWERING])
     again = Reexecution(np.array(outcomes.estimates, float).reshape(-1, 3), np.array(outcomes.demands, float))

@@ -89,7 +89,7 @@ class RecordedTrajectory:
 
     def __init__(self, backend: ReplayBackend, inner: Trajectory) -> None:
         self._backend, self._inner = backend, inner
-        self.hold, self.lower = inner.hold, inner.lower
+        self.hold, self.lower, self.velocity = inner.hold, inner.lower, inner.velocity
 
     def begin(self, t: float, position: float) -> None:  # noqa: ARG002 - as Trajectory's
         """Begin when the recorded one did: before `t` where that cycle itself is missing."""

@@ -22,9 +22,11 @@ def test_observer_is_told_of_friction_and_the_whole_disturbance_comes_back(
     # friction in rad/s2: -f1 sat(x_r' / 0.005 rad/s) with f1 = 1.3
     feedforward = FrictionFeedforward(Model())
     told = feedforward.told(Sample(T, 0.1, 2.0, 3), velocity)
-    assert told == (T, 0.1, pytest.approx(2.0 + friction / 5.4, rel=1e-12, abs=0), 3)  # as a voltage
+    assert told._replace(voltage=2.0) == Sample(T, 0.1, 2.0, 3)
+    assert told.voltage == pytest.approx(2.0 + friction / 5.4, rel=1e-12, abs=0)  # the same as a voltage
     whole = feedforward.whole(_REST, velocity)
-    assert whole == (0.0, 0.0, pytest.approx(7.0 + friction, rel=1e-12, abs=0))
+    assert whole._replace(disturbance=7.0) == _REST
+    assert whole.disturbance == pytest.approx(7.0 + friction, rel=1e-12, abs=0)
 
 
 def test_nothing_acted_before_the_first_sample_or_while_time_stood_still() -> None:
