@@ -45,7 +45,7 @@ class TrajectoryStage(Protocol):
         ...
 
     def velocity(self, t: float) -> float:
-        """Return the velocity of the reference at device time `t` (s), rad/s; a recording's own is planned."""
+        """Return the velocity of the reference at device time `t` (s), rad/s."""
         ...
 
 

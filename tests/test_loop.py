@@ -154,7 +154,7 @@ def test_loop_hands_the_velocities_of_the_reference_to_the_friction_that_is_fed_
     at = line.trajectory.at
     trajectory = SimpleNamespace(at=at, velocity=velocity, hold=lambda _: None, begin=lambda _, __: None)
     feedforward = FrictionFeedforward(Model(f1=1.3, ku=5.4))
-    loop.run(replace(line, trajectory=trajectory, friction=feedforward), _SAMPLES[1].t, _Stop())  # type: ignore[arg-type]
+    loop.run(replace(line, trajectory=trajectory, friction=feedforward), _SAMPLES[1].t, _Stop())
     first, second = _SAMPLES[:2]
     assert asked[2:] == [0.5 * (first.t + second.t), second.t + 0.001]  # in the middle, and when it acts
     told = [arguments[0] for name, arguments in stages.calls if name == "update"][2]
