@@ -143,6 +143,7 @@ def test_board_is_one_file(tmp_path: Path) -> None:
             "BOARD_NUMBER 5",
             "BOARD_NUMBER 5 is another board's. The numbers 1, 2, 5 are taken: choose one that is free",
         ),
+        ("BOARD_NUMBER 3", "BOARD_NUMBER 2", "BOARD_NUMBER 2 is another board's"),
         ("BOARD_NUMBER 3", "BOARD_NUMBER 0x63", "BOARD_NUMBER is 0x63. Write a number from 1 to 255"),
         ("#define BOARD_CAN_TX PB9\n", "", "there is no BOARD_CAN_TX. Write `#define BOARD_CAN_TX ...`"),
         (

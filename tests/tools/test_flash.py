@@ -9,6 +9,7 @@ import pytest
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
 from tools import flash
+from tools.boards import read_boards, released
 from tools.flash import CODE_ADDRESS, VECTORS_ADDRESS, Piece, commands, record_of
 from tools.record import RECORD_ADDRESS, SECTOR_BYTES, RecordLink, image, record
 
@@ -85,6 +86,24 @@ def test_supply_that_is_not_known_or_not_the_rigs_is_refused(
 ) -> None:
     with pytest.raises(ConfigError, match=words):
         record_of(load_rig("bench-serial", rig), board, **said)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("board", released(read_boards()))
+def test_every_board_that_is_released_can_be_flashed(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    supply = ("--set", "amplifier.supply_V=24", "--supply-V", "24") if board in pwm_boards() else ()
+    assert run(monkeypatch, board, "bench-serial", *supply, "--only", "record", "--dry-run") == 0
+
+
+def pwm_boards() -> list[str]:
+    return [name for name, board in read_boards().items() if board.amplifier == "pwm"]
+
+
+def test_board_with_a_program_of_its_own_cannot_be_flashed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        run(monkeypatch, "qemu_f405", "bench-serial", "--dry-run")
+    assert "invalid choice: 'qemu_f405'" in capsys.readouterr().err
 
 
 def test_pwm_board_without_its_supply_is_one_line(
