@@ -24,7 +24,9 @@ OBSERVERS = (
     "dcmp_hil.control.observers.super_twisting:SuperTwistingSettings",
     "dcmp_hil.control.observers.paper:PaperSettings",
 )
-CONTROLLERS = ("dcmp_hil.control.controllers.pd_compensated:PdSettings",)
+CONTROLLERS = (
+    "dcmp_hil.control.controllers.pd_compensated:PdSettings",  # a kind a line
+)
 REFERENCES = (
     "dcmp_hil.control.references.periodic:Sine",
     "dcmp_hil.control.references.periodic:Chirp",
