@@ -1,4 +1,4 @@
-"""`python -m tools.sample_recording`: write the recording that the project ships, from a simulation of its own.
+"""`python -m tools.sample_recording`: write the recording that the project ships, from its own simulation.
 
 The simulated pendulum has Coulomb friction, cogging and a push that comes and goes; its logger is late and
 loses rows. No measurement of a real pendulum is in it.
@@ -26,8 +26,9 @@ _DIFFERENCE_ROWS = 8  # over which the drive takes its own velocity: late and co
 
 
 class LoggedRow(NamedTuple):
-    """One row of the recording, and the true velocity that the file does not have."""
+    """One row of the recording, and what the file does not have: its number and the true velocity."""
 
+    number: int  # among all rows, those that were lost as well
     time: float  # s
     position: float  # rad, of the encoder
     voltage: float  # V, from this row to the next
@@ -41,7 +42,7 @@ def simulated_rows() -> list[LoggedRow]:
     plant = MoreauPlant(MODEL, MODEL, position=0.0, step=_TICK_S, steps=1)
     rows: list[LoggedRow] = []
     angles: list[tuple[float, float]] = []
-    now, position, velocity, lost = 0, 0.0, 0.0, 0
+    number, now, position, velocity, lost = 0, 0, 0.0, 0.0, 0
     while now * _TICK_S < _DURATION_S:
         t = now * _TICK_S
         count = math.tau / COUNTS_PER_REV
@@ -53,13 +54,13 @@ def simulated_rows() -> list[LoggedRow]:
             lost = rng.randint(1, _BURST_ROWS_MAX)
         if lost == 0:
             own = (angle - angles[0][1]) / span if span else 0.0
-            rows.append(LoggedRow(t, angle, voltage, own, velocity))
+            rows.append(LoggedRow(number, t, angle, voltage, own, velocity))
         lost = max(0, lost - 1)
         step = _PERIOD_TICKS + rng.randint(-_JITTER_TICKS, _JITTER_TICKS)
         for _ in range(step):
             cogging = _COGGING_RAD_S2 * math.sin(_COGGING_PER_REV * position)
             position, velocity, _w = plant.advance(voltage + cogging / MODEL.ku)
-        now += step
+        number, now = number + 1, now + step
     return rows
 
 
