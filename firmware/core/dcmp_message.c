@@ -9,14 +9,7 @@ struct layout {
 };
 
 /* By message number, the identifier of node 0 divided by 16. */
-static const struct layout layouts[] = {
-    {0, false},                           /* there is no message 0 */
-    {2, true},  {8, true},  {7, false},   /* STOP, DRIVE, FAULT */
-    {8, false}, {8, false},               /* SAMPLE, EDGE */
-    {7, true},  {8, false},               /* HELLO, IDENTITY */
-    {2, true},  {8, true},  {7, false},   /* PARAMETER_GET, _SET, _VALUE */
-    {7, false},                           /* HEALTH */
-};
+static const struct layout layouts[] = DCMP_LAYOUTS;
 
 /* Over the identifier too: a frame whose identifier was damaged is not taken for another message. */
 static uint8_t checksum(const struct dcmp_frame *frame)

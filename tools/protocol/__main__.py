@@ -28,6 +28,9 @@ def files() -> dict[Path, str]:
         _WIRE / "messages.py": python_code.messages(found),
         _WIRE / "layouts.py": python_code.layouts(found),
         _CORE / "dcmp_protocol_hash.h": c_code.protocol_hash(value),
+        _CORE / "dcmp_protocol.h": c_code.header(found),
+        _CORE / "dcmp_pack.c": c_code.pack(found),
+        _CORE / "dcmp_unpack.c": c_code.unpack(found),
     }
 
 

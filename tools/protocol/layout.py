@@ -91,6 +91,15 @@ class Layout:
     fields: tuple[Field, ...]
     words: tuple[Word, ...]
 
+    @property
+    def summary(self) -> str:
+        """The comment as it goes on after the message's name."""
+        return self.comment[:1].lower() + self.comment[1:]
+
+    def word(self, field: Field) -> Word:
+        """Return the word that contains a field."""
+        return next(word for word in self.words if field in word.fields)
+
 
 def layouts(database: Database) -> list[Layout]:
     """Return the layouts of all messages.

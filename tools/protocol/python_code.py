@@ -100,9 +100,7 @@ def _enum(one: Enumeration) -> str:
 
 
 def _class(layout: Layout) -> str:
-    """Write a class; its docstring goes on after the message's name in small letters."""
-    comment = layout.comment[:1].lower() + layout.comment[1:]
-    head = [f"class {layout.python}(NamedTuple):", f'    """{layout.name}: {comment}"""', ""]
+    head = [f"class {layout.python}(NamedTuple):", f'    """{layout.name}: {layout.summary}"""', ""]
     return "\n".join([*head, *(line for field in layout.fields for line in _member(field)), ""])
 
 
@@ -233,7 +231,7 @@ def _fields(layout: Layout) -> str:
     """Return the tuple of all fields, in the structure's order: single ones, and rows of the tables."""
     groups: list[list[str] | str] = []
     for field in layout.fields:
-        word = next(word for word in layout.words if field in word.fields)
+        word = layout.word(field)
         if _has_table(layout, word):
             if field == word.fields[0]:
                 groups.append(f"_{layout.name}_BYTE_{word.byte}[{_name(word)}]")
