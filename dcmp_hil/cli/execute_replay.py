@@ -14,7 +14,9 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import read_recording, replay, write_csv, write_rrd
 
 if TYPE_CHECKING:
-    from dcmp_hil.offline import ColumnOptions, ReplayResult, ReplaySettings
+    from collections.abc import Mapping, Sequence
+
+    from dcmp_hil.offline import ColumnOptions, Figures, LoggedSignals, ReplayResult, ReplaySettings
 
 
 class Outputs(NamedTuple):
@@ -42,8 +44,23 @@ class Outputs(NamedTuple):
     rig: str | None = None
 
 
-def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, outputs: Outputs) -> None:
+def execute(
+    file: Path,
+    columns: ColumnOptions,
+    settings: ReplaySettings,
+    outputs: Outputs,
+    variants: Sequence[tuple[str, ReplaySettings]] = (),
+) -> None:
     """Replay a file, then write and show what came of it.
+
+    Parameters
+    ----------
+    file, columns, settings
+        As for `read_recording` and `replay`.
+    outputs
+        What is written.
+    variants
+        Other settings to be compared, each with its keys in one text.
 
     Raises
     ------
@@ -51,19 +68,26 @@ def execute(file: Path, columns: ColumnOptions, settings: ReplaySettings, output
         As `read_recording` and `replay`; or if a file would overwrite the recording or cannot be written.
     """
     csv, rrd = _targets(file, outputs)
-    result = replay(read_recording(file, columns), settings)
+    recording = read_recording(file, columns)
+    result = replay(recording, settings)
+    compared = {label: _compared(label, recording, other) for label, other in variants}
+    document = _figures(result, compared)
     if rrd is not None and outputs.rrd is None and (reason := _no_library()):
         console.warn(f"no {rrd}: {reason}")
         rrd = None
     json = json_place(outputs.json)
     written, faults = write_each(
         [
-            (csv, lambda path: write_csv(result, path)),
-            (rrd, lambda path: write_rrd(result, path)),
-            (json, lambda path: console.write_json(str(path), _figures(result))),
+            (csv, lambda path: write_csv(result, path, compared)),
+            (rrd, lambda path: write_rrd(result, path, compared)),
+            (json, lambda path: console.write_json(str(path), document)),
         ]
     )
-    _show(file, settings, result, outputs)
+    _tell(result, compared)
+    if outputs.json == "-":
+        console.write_json("-", document)
+    else:
+        console.out.print(_table(file, settings, result, compared))
     for path in written:
         if path != json:
             console.note(f"wrote {path}")
@@ -80,21 +104,35 @@ def _no_library() -> str:
     return ""
 
 
-def _show(file: Path, settings: ReplaySettings, result: ReplayResult, outputs: Outputs) -> None:
+def _compared(label: str, recording: LoggedSignals, settings: ReplaySettings) -> ReplayResult:
+    """Replay with the settings of a variant; a fault names the variant."""
+    try:
+        return replay(recording, settings)
+    except ConfigError as error:
+        raise ConfigError(*(f"--compare {label}: {fault}" for fault in error.faults)) from error.__cause__
+
+
+def _tell(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> None:
+    """Note the columns that were read, and the remarks of each replay."""
     for column in result.recording.columns:
         console.note(str(column))
     for sentence in result.notes:
         console.note(sentence)
-    if outputs.json == "-":
-        console.write_json("-", _figures(result))
-    else:
-        console.out.print(_table(file, settings, result))
+    for label, other in compared.items():
+        for sentence in other.notes:
+            if sentence not in result.notes:
+                console.note(f"{label}: {sentence}")
 
 
-def _figures(result: ReplayResult) -> dict[str, Any]:
+def _figures(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> dict[str, Any]:
     """Return what `--json` writes: the figures, what was read from where, and the notes."""
     columns = [str(column) for column in result.recording.columns]
-    return {**result.figures.to_dict(), "columns": columns, "notes": list(result.notes)}
+    found = {**result.figures.to_dict(), "columns": columns, "notes": list(result.notes)}
+    others = [
+        {"set": label, **other.figures.to_dict(), "notes": list(other.notes)}
+        for label, other in compared.items()
+    ]
+    return {**found, "compared": others} if others else found
 
 
 def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
@@ -115,41 +153,66 @@ def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:
     return csv, rrd
 
 
-def _table(file: Path, settings: ReplaySettings, result: ReplayResult) -> Table:
-    figures = result.figures
-    first, last = figures.window_s
+def _table(
+    file: Path, settings: ReplaySettings, result: ReplayResult, compared: Mapping[str, ReplayResult]
+) -> Table:
+    first, last = result.figures.window_s
     table = Table(
         title=Text(f"{file.name}: {settings.kind}, {first:.2f} to {last:.2f} s"),
         title_justify="left",
-        show_header=False,
+        show_header=bool(compared),
         box=None,
         padding=(0, 2, 0, 0),
     )
-    table.add_column()
-    table.add_column(justify="right", style="bold")
+    table.add_column(overflow="fold")
+    for label in (settings.kind, *compared):
+        table.add_column(Text(label), justify="right", style="bold", overflow="fold")
     table.add_column(style="dim")
-    against = f"{settings.cutoff:g} Hz zero phase"
-    periods = f"{1e3 * figures.period_median_s:.4g} / {1e3 * figures.period_max_s:.4g}"
-    gaps = f"{figures.lost_samples}, {figures.restarts}"
-    counts = "ideal" if figures.counts_per_rev is None else f"{figures.counts_per_rev:.0f}"
-    for what, value, unit in (
-        ("velocity error, RMS", _number(figures.velocity_error_rms_rad_s), f"rad/s, {against}"),
-        ("velocity error, max", _number(figures.velocity_error_max_rad_s), "rad/s"),
-        ("velocity in the file, RMS error", _number(figures.given_velocity_error_rms_rad_s), "rad/s"),
-        ("velocity in the file, max error", _number(figures.given_velocity_error_max_rad_s), "rad/s"),
-        ("disturbance, RMS", _number(figures.disturbance_rms_rad_s2), "rad/s²"),
-        ("disturbance, mean", _number(figures.disturbance_mean_rad_s2), "rad/s²"),
-        ("disturbance error, RMS", _number(figures.disturbance_error_rms_rad_s2), f"rad/s², {against}"),
-        ("disturbance with -sin(position)", _number(figures.disturbance_sin_correlation), "correlation"),
-        ("rows, judged", f"{figures.rows}, {figures.rows_judged}", f"in {figures.duration_s:.4g} s"),
-        ("rows left out", f"{figures.rows_left_out}", "the notes say why"),
-        ("lost samples, restarts", gaps, "gaps above 10 periods, clock set back"),
-        ("period, median / max", periods, "ms"),
-        ("counts per revolution", counts, ""),
-        ("mu0", _number(figures.mu0_rad_s), "rad/s"),
-    ):
-        table.add_row(what, value, unit)
+    columns = [_values(one.figures) for one in (result, *compared.values())]
+    for (what, unit), *values in zip(_lines(settings, result.figures), *columns, strict=True):
+        table.add_row(what, *values, unit)
     return table
+
+
+def _lines(settings: ReplaySettings, figures: Figures) -> list[tuple[str, str]]:
+    """Return the name of each line of the table, and what stands behind its numbers."""
+    against = f"{settings.cutoff:g} Hz zero phase"
+    return [
+        ("velocity error, RMS", f"rad/s, {against}"),
+        ("velocity error, max", "rad/s"),
+        ("velocity in the file, RMS error", "rad/s"),
+        ("velocity in the file, max error", "rad/s"),
+        ("disturbance, RMS", "rad/s²"),
+        ("disturbance, mean", "rad/s²"),
+        ("disturbance error, RMS", f"rad/s², {against}"),
+        ("disturbance with -sin(position)", "correlation"),
+        ("rows, judged", f"in {figures.duration_s:.4g} s"),
+        ("rows left out", "the notes say why"),
+        ("lost samples, restarts", "gaps above 10 periods, clock set back"),
+        ("period, median / max", "ms"),
+        ("counts per revolution", ""),
+        ("mu0", "rad/s"),
+    ]
+
+
+def _values(figures: Figures) -> list[str]:
+    """Return the numbers of one replay, in the order of `_lines`."""
+    return [
+        _number(figures.velocity_error_rms_rad_s),
+        _number(figures.velocity_error_max_rad_s),
+        _number(figures.given_velocity_error_rms_rad_s),
+        _number(figures.given_velocity_error_max_rad_s),
+        _number(figures.disturbance_rms_rad_s2),
+        _number(figures.disturbance_mean_rad_s2),
+        _number(figures.disturbance_error_rms_rad_s2),
+        _number(figures.disturbance_sin_correlation),
+        f"{figures.rows}, {figures.rows_judged}",
+        f"{figures.rows_left_out}",
+        f"{figures.lost_samples}, {figures.restarts}",
+        f"{1e3 * figures.period_median_s:.4g} / {1e3 * figures.period_max_s:.4g}",
+        "ideal" if figures.counts_per_rev is None else f"{figures.counts_per_rev:.0f}",
+        _number(figures.mu0_rad_s),
+    ]
 
 
 def _number(value: float | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
@@ -21,7 +21,7 @@ from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.untrusted import named_in
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dcmp_hil.cli.execute_replay import Outputs
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.compare import Comparison
     from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.recording.reexecute import Reexecution
 
 _MAY_CHANGE = ("observer", "controller", "model")
 
@@ -88,25 +89,38 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
         raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
-    again = reexecute(run, _changed(run.rig, keys, trust=trust), trust=trust)
+    rig = _changed(run.rig, keys, trust=trust)
+    again = reexecute(run, rig, trust=trust)
+    others = {
+        label: _repeated(run, label, other, trust=trust)
+        for label, other in given.compared(rig or run.rig, _MAY_CHANGE)
+    }
     result = compare(run, again, start)
-    lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
-    figures = {"identical": result.identical, "rows": result.rows, **lines}
+    compared = {label: compare(run, other, start) for label, other in others.items()}
+    figures = _figures(result, compared)
     written, faults = write_each(
         [
-            (outputs.csv, partial(export.reexecution_to_csv, run, again)),
-            (outputs.rrd, partial(export.reexecution_to_rrd, run, again)),
+            (outputs.csv, partial(export.reexecution_to_csv, run, again, others)),
+            (outputs.rrd, partial(export.reexecution_to_rrd, run, again, others)),
             (json_file, lambda path: console.write_json(str(path), figures)),
         ]
     )
     if outputs.json == "-":
         console.write_json("-", figures)
     else:
-        console.out.print(_table(run, keys, result))
+        console.out.print(_table(run, keys, result, compared))
     for path in written:
         if path != json_file:
             console.note(f"wrote {path}")
     _end(run, faults)
+
+
+def _repeated(run: RecordedRun, label: str, rig: Rig, *, trust: bool) -> Reexecution:
+    """Run a variant of `--compare`; a fault names it."""
+    try:
+        return reexecute(run, rig.in_folder(run.rig.folder if trust else None), trust=trust)
+    except ConfigError as error:
+        raise ConfigError(*(f"--compare {label}: {fault}" for fault in error.faults)) from error.__cause__
 
 
 def _read(file: Path) -> RecordedRun:
@@ -164,7 +178,24 @@ def _changed(rig: Rig, overrides: Sequence[str], *, trust: bool) -> Rig | None:
     return load_table(table, overrides, rig.folder if trust else None)
 
 
-def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Table:
+def _figures(result: Comparison, compared: Mapping[str, Comparison]) -> dict[str, Any]:
+    """Return what `--json` writes: the figures of the run and of each repetition."""
+    lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
+    found = {"identical": result.identical, "rows": result.rows, **lines}
+    others = [
+        {
+            "set": label,
+            "identical": other.identical,
+            **{line.name: line.again for line in other.figures},
+        }
+        for label, other in compared.items()
+    ]
+    return {**found, "compared": others} if others else found
+
+
+def _table(
+    run: RecordedRun, overrides: Sequence[str], result: Comparison, compared: Mapping[str, Comparison]
+) -> Table:
     said = "every number is the same, to the bit" if result.identical else "the numbers differ"
     table = Table(
         title=Text(f"{run.path}: {result.rows} periods again: {said}"),
@@ -172,11 +203,13 @@ def _table(run: RecordedRun, overrides: Sequence[str], result: Comparison) -> Ta
         box=None,
         padding=(0, 2, 0, 0),
     )
-    table.add_column("")
-    table.add_column("recorded", justify="right")
-    table.add_column(Text(" ".join(overrides) or "again"), justify="right", style="bold")
-    for line in result.figures:
-        table.add_row(line.name, _number(line.recorded), _number(line.again))
+    table.add_column("", overflow="fold")
+    table.add_column("recorded", justify="right", overflow="fold")
+    for label in (" ".join(overrides) or "again", *compared):
+        table.add_column(Text(label), justify="right", style="bold", overflow="fold")
+    again = [[line.again for line in one.figures] for one in (result, *compared.values())]
+    for line, *values in zip(result.figures, *again, strict=True):
+        table.add_row(line.name, _number(line.recorded), *map(_number, values))
     return table
 
 

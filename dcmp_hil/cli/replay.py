@@ -103,6 +103,15 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
             rich_help_panel=_OBSERVER,
         ),
     ] = None,
+    variants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--compare",
+            metavar="KEY=VALUE",
+            help="Also with this key, side by side; of a run with controller.* too. Repeatable.",
+            rich_help_panel=_OBSERVER,
+        ),
+    ] = None,
     inertia: Annotated[
         float | None,
         _number(
@@ -207,6 +216,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         encoder={"rig": rig, "inertia": inertia, "counts_per_rev": counts_per_rev},
         figures={"start": window_from, "cutoff": cutoff},
         overrides=tuple(overrides or ()),
+        variants=tuple(variants or ()),
     )
     outputs = execute_replay.Outputs(
         json=json_file, csv=csv, rrd=rrd, by_default=not no_write, force=force, rig=rig
@@ -216,4 +226,5 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
 
         replay_own(file, given, outputs, trust=trust)
     else:
-        execute_replay.execute(file, given.column_options(), given.settings(), outputs)
+        columns, settings = given.column_options(), given.settings()
+        execute_replay.execute(file, columns, settings, outputs, given.compared_settings())

@@ -6,17 +6,19 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from dcmp_hil.config import load_tables
+from dcmp_hil.config import change_rig, load_tables
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
 from dcmp_hil.offline.settings import PERIOD_RANGE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from dcmp_hil.config.tables import RigTables
+
+T = TypeVar("T", bound="RigTables")
 
 IDEAL = "ideal"
 _OPTION_KEYS = {  # short options for keys of a rig
@@ -49,6 +51,8 @@ class Given:
         Start and cutoff.
     overrides
         Of `--set`.
+    variants
+        Of `--compare`.
     """
 
     columns: Mapping[str, Any]
@@ -57,6 +61,7 @@ class Given:
     encoder: Mapping[str, Any]
     figures: Mapping[str, Any]
     overrides: tuple[str, ...]
+    variants: tuple[str, ...] = ()
 
     def keys(self) -> tuple[str, ...]:
         """Return the short options and those of `--set` as overrides of a rig.
@@ -64,7 +69,7 @@ class Given:
         Raises
         ------
         ConfigError
-            If one key is given twice, or a number is beyond its option's range.
+            If one key is given twice.
         """
         written = [override.partition("=")[0].strip() for override in self.overrides]
         twice = [option for option in _set(self.gains) if _OPTION_KEYS[option] in written]
@@ -75,10 +80,44 @@ class Given:
                     for option in twice
                 )
             )
-        gains = _set({**self.gains, "observer": _kind(self.gains.get("observer"))})
-        numbers = _set({"inertia": self.encoder.get("inertia"), "cutoff": self.figures.get("cutoff")})
-        _ = ReplaySettings(**gains, **numbers).section  # its faults name the short options, every one at once
-        return (*(f"{_OPTION_KEYS[name]}={_toml(value)}" for name, value in gains.items()), *self.overrides)
+        return (
+            *(f"{_OPTION_KEYS[name]}={_toml(value)}" for name, value in self._gains.items()),
+            *self.overrides,
+        )
+
+    def compared(self, tables: T, allowed: Sequence[str]) -> list[tuple[str, T]]:
+        """Return each variant of `--compare`: its keys in one text, and the tables with them.
+
+        Parameters
+        ----------
+        tables
+            What `--set` has left of the rig.
+        allowed
+            Tables whose keys a variant may name.
+
+        Raises
+        ------
+        ConfigError
+            If a variant is there twice, or cannot be made.
+        """
+        found: dict[str, T] = {}
+        for text in self.variants:
+            keys = [_full_key(part.strip()) for part in text.split(";") if part.strip()]
+            label = "; ".join(keys)
+            if label in found:
+                raise ConfigError(f"--compare {text}: given twice. Leave one out.")
+            if not keys or any(key.partition(".")[0] not in allowed for key in keys):
+                raise ConfigError(
+                    f"--compare {text}: what was measured stays as it was. Write KEY=VALUE with a key of "
+                    f"{', '.join(allowed[:-1])} or {allowed[-1]}, such as observer.kind=paper; a semicolon "
+                    "parts several keys."
+                )
+            try:
+                found[label] = change_rig(tables, keys)
+            except ConfigError as error:
+                faults = (f"--compare {fault.removeprefix('--set ')}" for fault in error.faults)
+                raise ConfigError(*faults) from None
+        return list(found.items())
 
     def refused_of_a_run(self) -> list[str]:
         """Return the options that were given and mean nothing for a run's own recording."""
@@ -118,6 +157,20 @@ class Given:
         ConfigError
             With every value that is out of range, or a key that a file has not.
         """
+        return self._settings(self._tables)
+
+    def compared_settings(self) -> list[tuple[str, ReplaySettings]]:
+        """Return each variant of `--compare` of a file: its keys in one text, and its settings.
+
+        Raises
+        ------
+        ConfigError
+            If a variant is there twice, or cannot be made.
+        """
+        variants = self.compared(self._tables, _FILE_TABLES[:2])
+        return [(label, self._settings(tables)) for label, tables in variants]
+
+    def _settings(self, tables: RigTables) -> ReplaySettings:
         input_at = self.file.get("input_at")
         options = {
             "input_at": None if input_at is None else str(input_at),
@@ -126,24 +179,35 @@ class Given:
             "inertia": self.encoder.get("inertia"),
             **self.figures,
         }
-        return ReplaySettings(**{**self._from_tables, **_set(options)})
+        return ReplaySettings(**{**_settings_of(tables, named=self._named), **_set(options)})
+
+    @property
+    def _gains(self) -> dict[str, Any]:
+        """Return the short options that were given."""
+        return _set({**self.gains, "observer": _kind(self.gains.get("observer"))})
+
+    @property
+    def _named(self) -> bool:
+        return self.encoder.get("rig") is not None
 
     @cached_property
-    def _from_tables(self) -> dict[str, Any]:
-        """Return what `--rig`, `--set` and the short options say, in the words of `ReplaySettings`."""
+    def _tables(self) -> RigTables:
+        """Return what `--rig`, `--set` and the short options say of a file."""
         for override in self.overrides:
             if override.partition(".")[0] not in _FILE_TABLES:
                 raise ConfigError(
                     f"--set {override}: what was measured stays as it was; of a recording by another program "
                     "only keys of observer, model and encoder.counts_per_rev can be set."
                 )
-        source = self.encoder.get("rig")
-        return _settings_of(load_tables(source, self.keys()), named=source is not None)
+        keys = self.keys()
+        numbers = _set({"inertia": self.encoder.get("inertia"), "cutoff": self.figures.get("cutoff")})
+        _ = ReplaySettings(**self._gains, **numbers).section  # its faults name the short options, all at once
+        return load_tables(self.encoder.get("rig"), keys)
 
     def _counts(self) -> Any:
         text = self.encoder.get("counts_per_rev")
         if text is None:
-            return self._from_tables.get("counts_per_rev")
+            return _settings_of(self._tables, named=self._named).get("counts_per_rev")
         if text.lower() == IDEAL:
             return IDEAL
         try:
@@ -167,6 +231,15 @@ def _settings_of(rig: RigTables, *, named: bool) -> dict[str, Any]:
 
 def _set(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}
+
+
+def _full_key(override: str) -> str:
+    """Return an override with the key that a short option stands for, if it names one."""
+    key, equals, value = override.partition("=")
+    key, value = key.strip(), value.strip()
+    if key == "observer" and equals:
+        value = str(_kind(value))
+    return f"{_OPTION_KEYS.get(key, key)}{equals}{value}"
 
 
 def _kind(observer: str | None) -> str | None:

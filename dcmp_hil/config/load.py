@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.tables import RigTables
 
+T = TypeVar("T", bound="RigTables")
 _RIGS_FOLDER = resources.files("dcmp_hil").joinpath("rigs")
 _FILE_BYTES_MAX = 128 * 1024  # bytes: no rig is that long
 _LINE_CHARS_MAX = 4096  # characters: the time for a dotted key grows with the square of its length
@@ -113,7 +114,7 @@ def load_tables(source: str | Path | None, overrides: Sequence[str] = ()) -> Rig
     return tables if folder == Path() else tables.in_folder(folder.absolute())
 
 
-def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:
+def change_rig(rig: T, overrides: Sequence[str]) -> T:
     """Return a rig with overrides on top of what it says, read and checked as those of `load_rig` are.
 
     Raises
@@ -124,7 +125,7 @@ def change_rig(rig: Rig, overrides: Sequence[str]) -> Rig:
     table = rig.model_dump(exclude_unset=True)
     set_keys = apply_overrides(table, overrides)
     try:
-        return Rig.model_validate(table).in_folder(rig.folder)
+        return type(rig).model_validate(table).in_folder(rig.folder)
     except ValidationError as error:
         raise ConfigError(*explain_faults(error, table, rig.name, set_keys)) from None
 

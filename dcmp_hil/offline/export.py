@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import numpy as np
@@ -18,11 +20,23 @@ if TYPE_CHECKING:
     from dcmp_hil.offline.run import ReplayResult
 
 _INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V", "none": "voltage_V"}
+_ESTIMATE_COLUMNS = ("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2")
+_NONE_COMPARED: Mapping[str, ReplayResult] = MappingProxyType({})
 _APPLICATION_ID = "dcmp-hil replay"
 
 
-def columns(result: ReplayResult) -> dict[str, NDArray[np.float64]]:
+def columns(
+    result: ReplayResult, compared: Mapping[str, ReplayResult] = _NONE_COMPARED
+) -> dict[str, NDArray[np.float64]]:
     """Return the results of a replay as named columns.
+
+    Parameters
+    ----------
+    result
+        The replay.
+    compared
+        Other replays of the same recording: their estimates follow, with `_compare1`, `_compare2` ... behind
+        the name of each column.
 
     Returns
     -------
@@ -36,26 +50,38 @@ def columns(result: ReplayResult) -> dict[str, NDArray[np.float64]]:
         "time_s": recording.time,
         "position_rad": recording.position,
         _INPUT_COLUMN[recording.input_kind]: result.applied,
-        "position_estimate_rad": estimates.position,
-        "velocity_estimate_rad_s": estimates.velocity,
-        "disturbance_estimate_rad_s2": estimates.disturbance,
+        **dict(zip(_ESTIMATE_COLUMNS, estimates, strict=True)),
         "velocity_reference_rad_s": result.reference.velocity,
         "disturbance_reference_rad_s2": result.reference.disturbance,
     }
     if recording.velocity is not None:
         table["velocity_given_rad_s"] = recording.velocity
+    for number, other in enumerate(compared.values(), start=1):
+        names = ("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2")
+        table |= {
+            f"{name}_compare{number}": values for name, values in zip(names, other.estimates, strict=True)
+        }
     return table
 
 
-def write_csv(result: ReplayResult, path: Path) -> None:
+def write_csv(
+    result: ReplayResult, path: Path, compared: Mapping[str, ReplayResult] = _NONE_COMPARED
+) -> None:
     """Write `columns` as CSV; a field is empty where a stretch was too short for a reference.
+
+    Parameters
+    ----------
+    result, compared
+        As for `columns`.
+    path
+        Replaced if it is there.
 
     Raises
     ------
     ConfigError
         If the file cannot be written.
     """
-    table = columns(result)
+    table = columns(result, compared)
     digits = [".15g" if name == "time_s" else ".9g" for name in table]
     try:
         with whole_file(path) as place, place.open("w", newline="", encoding="utf-8") as file:
@@ -70,8 +96,19 @@ def write_csv(result: ReplayResult, path: Path) -> None:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
 
 
-def write_rrd(result: ReplayResult, path: Path) -> None:
+def write_rrd(
+    result: ReplayResult, path: Path, compared: Mapping[str, ReplayResult] = _NONE_COMPARED
+) -> None:
     """Write a replay as a Rerun recording, its time counted from the first row.
+
+    Parameters
+    ----------
+    result
+        The replay.
+    path
+        Replaced if it is there.
+    compared
+        Other replays of the same recording, by the name that their lines have.
 
     Raises
     ------
@@ -91,6 +128,9 @@ def write_rrd(result: ReplayResult, path: Path) -> None:
         "joint/disturbance_rad_s2": {"estimate": estimates.disturbance, "reference": reference.disturbance},
         f"control/{name}": {"applied": result.applied},
     }
+    for label, other in compared.items():
+        for entity, values in zip(plots, other.estimates, strict=False):  # all but the input
+            plots[entity][label] = values
     try:
         with whole_file(path) as place:
             try:

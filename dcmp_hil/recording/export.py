@@ -14,7 +14,7 @@ from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import numpy as np
@@ -69,13 +69,31 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
         sink.close()
 
 
-def reexecution_to_csv(run: RecordedRun, again: Reexecution, path: Path) -> None:
-    """Write what observer and controller said then and now, one row a cycle."""
+def reexecution_to_csv(
+    run: RecordedRun, again: Reexecution, others: Mapping[str, Reexecution], path: Path
+) -> None:
+    """Write what observer and controller said then and now, one row a cycle.
+
+    Parameters
+    ----------
+    run, again
+        The run, and its repetition: columns ending in `_again`.
+    others
+        Further repetitions, by name: columns ending in `_compare1`, `_compare2` ..., in their order.
+    path
+        Replaced if it is there.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be written.
+    """
     wanted = ("time_s", *_REPLAYED_COLUMNS)
-    now = tuple(_now(again).values())
+    endings = ("again", *(f"compare{number}" for number in range(1, len(others) + 1)))
+    now = [values for one in (again, *others.values()) for values in _now(one).values()]
     with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow((*wanted, *(f"{name}_again" for name in _REPLAYED_COLUMNS)))
+        writer.writerow((*wanted, *(f"{name}_{ending}" for ending in endings for name in _REPLAYED_COLUMNS)))
         first = 0
         for block in run.blocks():
             then, end = columns(block), first + len(block)
@@ -83,12 +101,32 @@ def reexecution_to_csv(run: RecordedRun, again: Reexecution, path: Path) -> None
             first = end
 
 
-def reexecution_to_rrd(run: RecordedRun, again: Reexecution, path: Path) -> None:
-    """Write what observer and controller said then and now as a Rerun recording, one plot a signal."""
+def reexecution_to_rrd(
+    run: RecordedRun, again: Reexecution, others: Mapping[str, Reexecution], path: Path
+) -> None:
+    """Write what observer and controller said then and now as a Rerun recording, one plot a signal.
+
+    Parameters
+    ----------
+    run, again
+        The run, and its repetition.
+    others
+        Further repetitions, by the name that their lines have.
+    path
+        Replaced if it is there.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be written.
+    """
     from dcmp_hil.telemetry.rerun.series import write_series
 
     then = run.columns
     plots = {name: {"recorded": then[name], "again": values} for name, values in _now(again).items()}
+    for label, other in others.items():
+        for name, values in _now(other).items():
+            plots[name][label] = values
     time = then["time_s"]
     with _writing(path) as place:
         write_series(place, "dcmp-hil replay", time - time[0], plots)

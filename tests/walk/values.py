@@ -52,6 +52,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
     "replay": {
         "FILE": (("{csv}",), ("{recording}",)),
         "--set": given("--set", "observer.mu0_rad_s=150"),
+        "--compare": given("--compare", "observer=paper"),
         **_columns(),
         "--inertia": given("--inertia", "0.16"),
         "--ku": given("--ku", "5.4"),
