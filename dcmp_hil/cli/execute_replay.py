@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from dcmp_hil.offline import ColumnOptions, Figures, LoggedSignals, ReplayResult, ReplaySettings
 
+_COLUMN_WIDTH_MIN = 9  # characters
+
 
 class Outputs(NamedTuple):
     """Output files of a replay.
@@ -164,9 +166,10 @@ def _table(
         box=None,
         padding=(0, 2, 0, 0),
     )
-    table.add_column(overflow="fold")
+    least = _COLUMN_WIDTH_MIN if compared else None  # a label folds, a number does not
+    table.add_column(no_wrap=True)
     for label in (settings.kind, *compared):
-        table.add_column(Text(label), justify="right", style="bold", overflow="fold")
+        table.add_column(Text(label), justify="right", style="bold", overflow="fold", min_width=least)
     table.add_column(style="dim")
     columns = [_values(one.figures) for one in (result, *compared.values())]
     for (what, unit), *values in zip(_lines(settings, result.figures), *columns, strict=True):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.recording.reexecute import Reexecution
 
+_COLUMN_WIDTH_MIN = 9  # characters
 _MAY_CHANGE = ("observer", "controller", "model")
 
 
@@ -203,10 +204,11 @@ def _table(
         box=None,
         padding=(0, 2, 0, 0),
     )
-    table.add_column("", overflow="fold")
+    least = _COLUMN_WIDTH_MIN if compared else None  # a label folds, a number does not
+    table.add_column("", no_wrap=True)
     table.add_column("recorded", justify="right", overflow="fold")
     for label in (" ".join(overrides) or "again", *compared):
-        table.add_column(Text(label), justify="right", style="bold", overflow="fold")
+        table.add_column(Text(label), justify="right", style="bold", overflow="fold", min_width=least)
     again = [[line.again for line in one.figures] for one in (result, *compared.values())]
     for line, *values in zip(result.figures, *again, strict=True):
         table.add_row(line.name, _number(line.recorded), *map(_number, values))
