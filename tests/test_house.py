@@ -99,6 +99,25 @@ def test_one_module_looks_for_similar_names() -> None:
     assert users == {"dcmp_hil.common.similar_names"}
 
 
+def test_processes_of_our_own_are_started_in_one_place() -> None:
+    assert _users("'-c'") == {"dcmp_hil.platform.python_command"}
+    of_ten_lines = {
+        "dcmp_hil.platform.display",
+        "dcmp_hil.platform.parent_death",
+    }  # that import nothing of ours
+    assert _users("python_command(") == {"dcmp_hil.ipc.child_process"} | of_ten_lines
+    assert _users("os.getppid()") == {"dcmp_hil.ipc.child_process"}
+
+
+def _users(code: str) -> set[str]:
+    """Return the modules in which a call or a list contains a piece of code."""
+    return {
+        name
+        for name, tree in _modules().items()
+        if any(code in ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Call | ast.List))
+    }
+
+
 def test_no_heavy_library_stands_behind_the_loop_not_even_in_a_function() -> None:
     reached, ahead = set[str](), {"dcmp_hil.loop"}
     while ahead:

@@ -1,44 +1,197 @@
-"""Answers of a child process: waited for as long as it works, and what is known where none comes."""
+"""A Python process of our own: started with a set-up, tied to this one by a channel, waited for and ended.
+
+Both sides notice by the channel that the other one has gone, and the child by the number of its parent.
+"""
 
 from __future__ import annotations
 
+import os
+import pickle
+import select
 import signal
+import socket
 import subprocess
+import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.ipc.shared_memory import Log, reserve
 from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
+from dcmp_hil.platform.python_command import python_command
 
 if TYPE_CHECKING:
-    import socket
+    from collections.abc import Collection, Mapping, Sequence
 
 MESSAGE_BYTES_MAX = 1 << 16
-"""Bytes of the longest."""
+"""Bytes of the longest message."""
 _WORK_TIMEOUT_S = 60.0  # s that a process has which works at its answer
+_CODE = """
+import sys
+sys.path[:] = {path!r}
+from dcmp_hil.ipc.child_process import ParentProcess
+from {module} import main
+main(ParentProcess({parent}, {channel}, {setup}), *{arguments})
+"""
 
 
-def receive(channel: socket.socket, within: float) -> bytes:
-    """Return the next message; nothing if there is none in time, or never will be."""
-    channel.settimeout(max(within, 1e-3))
-    try:
-        return channel.recv(MESSAGE_BYTES_MAX)
-    except OSError:
-        return b""
-    finally:
-        channel.setblocking(False)  # a socket with a timeout waits even where it is told not to
+class ChildProcess:
+    """A child as its parent sees it.
 
+    Parameters
+    ----------
+    module
+        Its `main(parent, *arguments)` is called there, `parent` being a ParentProcess.
+    setup
+        What `parent.setup` is there: an object that can be pickled.
+    shared
+        Descriptors that the child has as well, under the same numbers.
+    arguments
+        Descriptors, the same, that `main` takes.
+    kind
+        Of the socket: a stream, or messages.
+    environment
+        Of the child; None for that of this process.
+    blocked
+        Signals that wait until the child unblocks them.
 
-def receive_from_working(process: subprocess.Popen[bytes], channel: socket.socket, idle: float) -> bytes:
-    """Return the next message; nothing once the process has done nothing for `idle` (s), or has ended."""
-    clock = MonotonicClock()
-    end_ns = clock.now_ns() + int(_WORK_TIMEOUT_S * 1e9)
-    used = _cpu_time(process.pid)
-    while not (answer := receive(channel, idle)) and clock.now_ns() < end_ns:
-        before, used = used, _cpu_time(process.pid)
-        if used is None or used == before:
+    Attributes
+    ----------
+    process
+        As `subprocess` has it.
+    channel
+        A socket that never blocks; closed by `hang_up`, which the child notices.
+
+    Raises
+    ------
+    OSError
+        If it cannot be started.
+    """
+
+    def __init__(
+        self,
+        module: str,
+        setup: object,
+        *,
+        shared: Sequence[int] = (),
+        arguments: Sequence[int] = (),
+        kind: socket.SocketKind = socket.SOCK_STREAM,
+        environment: Mapping[str, str] | None = None,
+        blocked: Collection[signal.Signals] = (),
+    ) -> None:
+        self._setup = reserve(self, "setup")
+        Log(self._setup).append(pickle.dumps(setup))
+        self.channel, theirs = socket.socketpair(socket.AF_UNIX, kind)
+        self.channel.setblocking(False)
+        with theirs:
+            code = _CODE.format(
+                path=sys.path,
+                module=module,
+                parent=os.getpid(),
+                channel=theirs.fileno(),
+                setup=self._setup,
+                arguments=tuple(arguments),
+            )
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
+            try:
+                self.process = subprocess.Popen(  # noqa: S603 - our own code
+                    python_command(code),
+                    pass_fds=[theirs.fileno(), self._setup, *arguments, *shared],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                    env=environment,
+                )
+            except OSError:
+                self.channel.close()
+                raise
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        keep_from_forks(self.channel.fileno())
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self.process.pid
+
+    def is_heard(self, within: float) -> bool:
+        """Return whether it sends something, or has gone, within so many seconds."""
+        return bool(select.select([self.channel], [], [], within)[0])
+
+    def receive(self, within: float) -> bytes:
+        """Return the next message; nothing if there is none in time, or never will be."""
+        self.channel.settimeout(max(within, 1e-3))
+        try:
+            return self.channel.recv(MESSAGE_BYTES_MAX)
+        except OSError:
             return b""
-    return answer
+        finally:
+            self.channel.setblocking(False)  # a socket with a timeout waits even where it is told not to
+
+    def receive_from_working(self, idle: float) -> bytes:
+        """Return the next message; nothing once it has done nothing for `idle` (s), or has ended."""
+        clock = MonotonicClock()
+        end_ns = clock.now_ns() + int(_WORK_TIMEOUT_S * 1e9)
+        used = _cpu_time(self.pid)
+        while not (answer := self.receive(idle)) and clock.now_ns() < end_ns:
+            before, used = used, _cpu_time(self.pid)
+            if used is None or used == before:
+                return b""
+        return answer
+
+    def say_no_more(self) -> None:
+        """Have the child see the end of what it is sent; it may still answer."""
+        with suppress(OSError):
+            self.channel.shutdown(socket.SHUT_WR)
+
+    def hang_up(self) -> None:
+        """Close the channel."""
+        if self.channel.fileno() >= 0:
+            forget(self.channel.fileno())
+            self.channel.close()
+
+    def end(self, within: float) -> int:
+        """Wait for it so many seconds, then kill it; return how it ended."""
+        return end_process(self.process, within)
+
+
+class ParentProcess:
+    """The parent as its child sees it.
+
+    Parameters
+    ----------
+    pid
+        Its number.
+    channel, setup
+        Descriptors: of the socket between the two, and of the pickled set-up.
+
+    Attributes
+    ----------
+    pid
+        Its number.
+    channel
+        The socket between the two.
+    """
+
+    def __init__(self, pid: int, channel: int, setup: int) -> None:
+        self.pid, self._setup = pid, setup
+        self.channel = socket.socket(fileno=channel)
+
+    @property
+    def setup(self) -> Any:
+        """Return a new copy of what the parent gave."""
+        data = os.pread(self._setup, os.fstat(self._setup).st_size, 0)
+        return pickle.loads(data)  # noqa: S301 - written by our own parent
+
+    @property
+    def lives(self) -> bool:
+        """Whether it is there."""
+        return parent_lives(self.pid)
+
+
+def parent_lives(pid: int) -> bool:
+    """Return whether the process that started this one is there: once it is gone, another is the parent."""
+    return os.getppid() == pid
 
 
 def _cpu_time(pid: int) -> int | None:

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import pickle
-import select
 import signal
-import socket
-import subprocess
-import sys
 import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.ipc.child_process import ChildProcess
 from dcmp_hil.ipc.mailbox import MAILBOX_BYTES, Mailbox
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live.command_server import CommandSetup
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.stop_request import SIGNALS
 
 if TYPE_CHECKING:
@@ -29,12 +23,7 @@ if TYPE_CHECKING:
 _START_TIMEOUT_S = 60.0  # s, a far limit: that it is up is an event, and nothing is armed yet
 _POLL_PERIOD_S = 0.1  # s
 _EXIT_TIMEOUT_S = 0.5  # s for it to leave in, at the end of a run
-_CODE = """
-import sys
-sys.path[:] = {path!r}
-from dcmp_hil.live.command_server import main
-main({line}, {setup}, {parent})
-"""
+_SERVER_MODULE = "dcmp_hil.live.command_server"
 
 
 class CommandProcess:
@@ -61,11 +50,10 @@ class CommandProcess:
         self, *, listen: bool = True, unattended: Callable[[SummarySink, int, str, str], None] | None = None
     ) -> None:
         self._listen, self.unattended = listen, unattended
-        self._file, self._setup = reserve(self, "mailbox"), reserve(self, "command")
+        self._file = reserve(self, "mailbox")
         self.mailbox = Mailbox(mapped(self._file, MAILBOX_BYTES))
         self.pid: int | None = None
-        self._line: socket.socket | None = None
-        self._process: subprocess.Popen[bytes] | None = None
+        self._child: ChildProcess | None = None
         self._closing = False
         self._watch = threading.Thread(target=self._wait, name="command", daemon=True)
         self._warn: Callable[[str], None]
@@ -73,7 +61,7 @@ class CommandProcess:
     @property
     def signals(self) -> int:
         """Descriptor that takes the numbers of signals; -1 while there is none."""
-        return -1 if self._line is None else self._line.fileno()
+        return -1 if self._child is None else self._child.channel.fileno()
 
     @property
     def file(self) -> int:
@@ -85,57 +73,44 @@ class CommandProcess:
         if ring is None:
             return
         self._warn = warn
-        os.write(self._setup, pickle.dumps(CommandSetup(rig, self._file, ring, self._listen)))
-        line, theirs = socket.socketpair()
-        line.setblocking(False)
-        with theirs:
-            code = _CODE.format(path=sys.path, line=theirs.fileno(), setup=self._setup, parent=os.getpid())
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until it has handlers of its own
-            try:
-                self._process = subprocess.Popen(  # noqa: S603 - our own code
-                    [sys.executable, "-c", code],
-                    pass_fds=[theirs.fileno(), self._setup, self._file, ring],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
-                )
-            except OSError as error:
-                line.close()
-                warn(f"The command process could not be started ({error}): this run cannot be changed.")
-                return
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        self._line = line
-        keep_from_forks(line.fileno())
-        self.pid = self._process.pid
+        try:
+            child = ChildProcess(
+                _SERVER_MODULE,
+                CommandSetup(rig, self._file, ring, self._listen),
+                shared=[self._file, ring],
+                blocked=SIGNALS,  # until it has handlers of its own
+            )
+        except OSError as error:
+            warn(f"The command process could not be started ({error}): this run cannot be changed.")
+            return
+        self._child, self.pid = child, child.pid
         self._watch.start()
 
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:
         """Wait until it listens; not for one that has ended. See `CommandInterface`."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(1e9 * _START_TIMEOUT_S)
-        while self._line is not None and self._watch.is_alive() and not stopped():
-            if select.select([self._line], [], [], _POLL_PERIOD_S)[0] or clock.now_ns() > end_ns:
+        while self._child is not None and self._watch.is_alive() and not stopped():
+            if self._child.is_heard(_POLL_PERIOD_S) or clock.now_ns() > end_ns:
                 return
 
     def close(self, last_words: str, end: int) -> None:
         """Report the end of the run to the process, and wait for its end."""
         self._closing = True
         self.mailbox.tell_end(last_words, end)
-        if self._line is not None:
-            forget(self._line.fileno())
-            self._line.close()
-        if self._process is not None:
+        if self._child is not None:
+            self._child.hang_up()
             self._watch.join(_EXIT_TIMEOUT_S)
             if self._watch.is_alive():
-                self._process.kill()
+                self._child.process.kill()
                 self._watch.join(_EXIT_TIMEOUT_S)
 
     def _wait(self) -> None:
         """Wait for its end, on a thread that the kernel wakes only then, and that signals get through to."""
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-        assert self._process is not None  # noqa: S101 - started after it
+        assert self._child is not None  # noqa: S101 - started after it
         with suppress(OSError):
-            code = self._process.wait()
+            code = self._child.process.wait()
             if not self._closing:
                 why = self.mailbox.last_words or f"exit code {code}"
                 self._warn(

@@ -8,13 +8,13 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import pickle
-import socket
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import DcmpError
+from dcmp_hil.ipc.child_process import parent_lives
 from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, MAILBOX_BYTES, STOP_REQUEST, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
 from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
@@ -29,9 +29,11 @@ from dcmp_hil.live.tunables import changed, doubts
 from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
+    import socket
     from pathlib import Path
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.ipc.child_process import ParentProcess
     from dcmp_hil.ipc.mailbox import Answer
     from dcmp_hil.live.stop_command import Stopped
 
@@ -144,7 +146,7 @@ class Server:
         written = self._ring.written
         if written != self._written:
             self._written, self._newest_ns = written, self._clock.now_ns()
-        return os.getppid() == self._parent
+        return parent_lives(self._parent)
 
     def stop(self, by: int = STOP_REQUEST) -> asyncio.Task[Stopped]:
         """End the run once, by force if it does not answer."""
@@ -155,7 +157,7 @@ class Server:
     def _stop(self, by: int) -> Stopped:
         ms = getattr(self._rig.backend, "watchdog_ms", None)
         watchdog = f"within {ms} ms" if ms else ""
-        alive = lambda: os.getppid() == self._parent  # noqa: E731
+        alive = partial(parent_lives, self._parent)
         return stop_run(self._parent, self._mailbox, alive, watchdog=watchdog, by=by)
 
     async def _answer_stop(self, writer: asyncio.StreamWriter) -> None:
@@ -241,16 +243,15 @@ def _remove(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def main(line: int, setup: int, parent: int) -> None:
-    """Serve the run of process `parent`; `line` and `setup` are descriptors."""
-    os.lseek(setup, 0, os.SEEK_SET)
-    with socket.socket(fileno=line) as connection, open(setup, "rb", closefd=False) as file:
+def main(parent: ParentProcess) -> None:
+    """Serve the run that started this process, and gives a CommandSetup."""
+    with parent.channel as connection:
         connection.setblocking(False)
-        prepared: CommandSetup = pickle.load(file)  # noqa: S301 - written by our own parent
-        mailbox = Mailbox(mapped(prepared.mailbox, MAILBOX_BYTES))
+        setup: CommandSetup = parent.setup
+        mailbox = Mailbox(mapped(setup.mailbox, MAILBOX_BYTES))
         try:
-            path = socket_of(parent) if prepared.listen else None
-            asyncio.run(_serve(connection, Server(prepared, mailbox, parent), mailbox, path))
+            path = socket_of(parent.pid) if setup.listen else None
+            asyncio.run(_serve(connection, Server(setup, mailbox, parent.pid), mailbox, path))
         except (DcmpError, OSError) as error:
             mailbox.tell_end(str(error).rstrip("."), LIVES)
     os._exit(0)  # connections that are still open would be waited for

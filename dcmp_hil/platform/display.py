@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
+
+from dcmp_hil.platform.python_command import python_command
 
 _CONNECT_TIMEOUT_S = 20.0  # s for a display that is far away, or frozen; one that is gone is known at once
 _CONNECT_CODE = """
@@ -36,7 +37,7 @@ def display_problem() -> str:
             continue
         try:
             done = subprocess.run(  # noqa: S603 - our own code
-                [sys.executable, "-I", "-S", "-c", _CONNECT_CODE, library, function],
+                python_command(_CONNECT_CODE, library, function, isolated=True),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,

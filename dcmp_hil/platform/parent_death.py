@@ -6,6 +6,8 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from dcmp_hil.platform.python_command import python_command
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,4 +29,4 @@ def tied(command: Sequence[str]) -> list[str]:
     """
     if not sys.platform.startswith("linux"):
         return list(command)
-    return [sys.executable, "-I", "-S", "-c", _CODE, str(os.getpid()), *command]
+    return python_command(_CODE, str(os.getpid()), *command, isolated=True)

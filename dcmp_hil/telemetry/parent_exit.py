@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from typing import NamedTuple
 
+from dcmp_hil.ipc.child_process import parent_lives
 from dcmp_hil.ipc.run_end import FORCED, RUN_CODES, end_in
 from dcmp_hil.platform.clock import MonotonicClock, pause
 
@@ -42,10 +42,10 @@ def how_it_died(mailbox: int | None, parent: int) -> Death | None:
         Its process id.
     """
     if mailbox is None:
-        return None if os.getppid() == parent else _DIED
+        return None if parent_lives(parent) else _DIED
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_EXIT_TIMEOUT_S * 1e9)
-    while os.getppid() == parent:
+    while parent_lives(parent):
         if end_in(mailbox) in RUN_CODES or clock.now_ns() > end_ns:
             return None
         pause(_POLL_PERIOD_S)

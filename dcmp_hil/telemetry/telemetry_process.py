@@ -10,21 +10,18 @@ from __future__ import annotations
 import atexit
 import os
 import pickle
-import select
 import socket
 import subprocess
-import sys
 from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.ipc.child_process import end_process, how_it_ended, receive, receive_from_working
+from dcmp_hil.ipc.child_process import ChildProcess, end_process, how_it_ended
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.shared_memory import Ledger, mapped, reserve
 from dcmp_hil.platform.clock import MonotonicClock
-from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.process_log import terminal_copy
 from dcmp_hil.telemetry.dispatcher import SinkDispatcher
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
@@ -56,12 +53,7 @@ _MALLOC_ENVIRONMENT = {
 
 Rerun's allocator gives free pages back at once and not after a second: it holds 7 MB instead of 22 MB.
 """
-_CODE = """
-import sys
-sys.path[:] = {path!r}
-from dcmp_hil.telemetry.telemetry_worker import main
-main({connection}, {setup}, {terminal})
-"""
+_WORKER_MODULE = "dcmp_hil.telemetry.telemetry_worker"
 
 
 class TelemetryProcess:
@@ -112,8 +104,8 @@ class TelemetryProcess:
         mailbox: int | None = None,
         speed: float = 1.0,
     ) -> None:
-        self._files = [reserve(self, what) for what in ("ring", "ledger", "setup", "columns", "events")]
-        ring, ledger, self._setup, *kept = self._files
+        self._files = [reserve(self, what) for what in ("ring", "ledger", "columns", "events")]
+        ring, ledger, *kept = self._files
         self.ring_file = ring
         self._kept = (kept[0], kept[1]) if keep else None
         self._ledger = Ledger(ledger)
@@ -121,14 +113,13 @@ class TelemetryProcess:
         self._told: deque[Event] = deque(maxlen=_EVENTS_MAX)
         self._untold: deque[Event] = deque(maxlen=_EVENTS_MAX)
         self._events = 0  # told or not
-        self._channel: socket.socket | None = None
-        self._process: subprocess.Popen[bytes] | None = None
+        self._child: ChildProcess | None = None
         self.ring = Ring(_CAPACITY_ROWS, mapped(ring, size_of(_CAPACITY_ROWS)))
         self.figures = SummarySink(statistics, SharedMemorySink(self._kept) if self._kept else None)
         self.dropped = 0
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
-        setup = WorkerSetup(
+        self._setup = WorkerSetup(
             _CAPACITY_ROWS,
             ring,
             ledger,
@@ -141,7 +132,6 @@ class TelemetryProcess:
             speed,
         )
         self._model = model
-        os.write(self._setup, pickle.dumps(setup))
 
     def open(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Start the process and wait until its sinks are made, or it ends, or `stopped` says so.
@@ -152,18 +142,17 @@ class TelemetryProcess:
             If a sink raises it.
         """
         try:
-            process, channel = self._start()
+            child = self._start()
         except OSError as error:
             self._go_without(f"could not be started ({error})")
             return
-        answer = self._wait_until_up(channel, stopped)
+        answer = self._wait_until_up(child, stopped)
         if answer == UP:
-            self._process, self._channel, self.pid = process, channel, process.pid
-            keep_from_forks(channel.fileno())
+            self._child, self.pid = child, child.pid
             self._send_events()
             return
-        channel.close()
-        end_process(process, 0.0)
+        child.hang_up()
+        child.end(0.0)
         if answer:
             raise ConfigError(*pickle.loads(answer))  # noqa: S301 - written by our own child
         if not stopped():
@@ -185,11 +174,12 @@ class TelemetryProcess:
     def close(self) -> None:
         """Finish the figures and close the sinks, within 2 s; take over what the process cannot do."""
         sentence = ""
-        if self._process and self._channel:
-            with self._channel:
-                forget(self._channel.fileno())
-                sentence = self._finish(self._process, self._channel)
-            self._process = self._channel = None
+        if self._child:
+            try:
+                sentence = self._finish(self._child)
+            finally:
+                self._child.hang_up()
+            self._child = None
         self._take_over()
         if sentence:
             lost = f"{self.dropped} periods are in no figure" if self.dropped else "the figures are complete"
@@ -199,13 +189,13 @@ class TelemetryProcess:
 
     # ---------------------------------------------------------------- the process
 
-    def _wait_until_up(self, channel: socket.socket, stopped: Callable[[], bool]) -> bytes:
+    def _wait_until_up(self, child: ChildProcess, stopped: Callable[[], bool]) -> bytes:
         """Return the first message; nothing if the process ended, was not waited for, or takes minutes."""
         clock = MonotonicClock()
         began_ns, told = clock.now_ns(), False
         while not stopped() and (waited := 1e-9 * (clock.now_ns() - began_ns)) < _START_TIMEOUT_S:
-            if select.select([channel], [], [], min(_POLL_PERIOD_S, _START_TIMEOUT_S))[0]:
-                return receive(channel, _POLL_PERIOD_S)
+            if child.is_heard(min(_POLL_PERIOD_S, _START_TIMEOUT_S)):
+                return child.receive(_POLL_PERIOD_S)
             if waited > _SLOW_START_S and not told and self._warn_user:
                 told = True
                 self._warn_user(
@@ -213,53 +203,43 @@ class TelemetryProcess:
                 )
         return b""
 
-    def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket]:
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs, terminal_copy() as terminal:
-            code = _CODE.format(
-                path=sys.path, connection=theirs.fileno(), setup=self._setup, terminal=terminal
+    def _start(self) -> ChildProcess:
+        with terminal_copy() as terminal:
+            return ChildProcess(
+                _WORKER_MODULE,
+                self._setup,
+                shared=self._shared,
+                arguments=[terminal],
+                kind=socket.SOCK_SEQPACKET,
+                environment={**_MALLOC_ENVIRONMENT, **os.environ},
             )
-            try:
-                process = subprocess.Popen(  # noqa: S603 - our own code
-                    [sys.executable, "-c", code],
-                    pass_fds=[theirs.fileno(), terminal, *self._shared],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
-                    env={**_MALLOC_ENVIRONMENT, **os.environ},
-                )
-            except OSError:
-                ours.close()
-                raise
-        return process, ours
 
-    def _finish(self, process: subprocess.Popen[bytes], channel: socket.socket) -> str:
+    def _finish(self, child: ChildProcess) -> str:
         """Wait until the process ends; return the error message, empty if there is none."""
         clock = MonotonicClock()
         end_ns = clock.now_ns() + int(_END_TIMEOUT_S * 1e9)
-        with suppress(OSError):
-            self._send_events()
-            channel.shutdown(socket.SHUT_WR)
-        if receive_from_working(process, channel, _SUMMARY_TIMEOUT_S) != FIGURES:
+        self._send_events()
+        child.say_no_more()
+        if child.receive_from_working(_SUMMARY_TIMEOUT_S) != FIGURES:
             with suppress(subprocess.TimeoutExpired):  # if its end is closed, the process has ended already
-                return how_it_ended(process.wait(_REAP_TIMEOUT_S))
-            end_process(process, 0.0)
+                return how_it_ended(child.process.wait(_REAP_TIMEOUT_S))
+            child.end(0.0)
             return f"did not answer for {_SUMMARY_TIMEOUT_S} s"
-        if receive(channel, max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
-            if process.poll() is not None:
-                return how_it_ended(process.returncode)
-            atexit.register(
-                end_process, process, _EXIT_TIMEOUT_S
-            )  # a window that is still opening, or a disk that is slow
+        if child.receive(max(0, end_ns - clock.now_ns()) * 1e-9) != DONE:
+            if (code := child.process.poll()) is not None:
+                return how_it_ended(code)
+            # a window that is still opening, or a disk that is slow
+            atexit.register(end_process, child.process, _EXIT_TIMEOUT_S)
             return ""
-        end_process(process, _END_TIMEOUT_S)
+        child.end(_END_TIMEOUT_S)
         return ""
 
     def _send_events(self) -> None:
-        while self._untold and self._channel:
+        while self._untold and self._child:
             event = self._untold[0]
             message = pickle.dumps(tuple(event._replace(text=event.text[:_EVENT_TEXT_CHARS_MAX])))
             try:
-                self._channel.send(message, socket.MSG_DONTWAIT)
+                self._child.channel.send(message, socket.MSG_DONTWAIT)
             except OSError:  # no room, or no reader: what is not read is taken over at the end
                 return
             self._untold.popleft()

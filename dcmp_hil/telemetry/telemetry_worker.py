@@ -32,6 +32,7 @@ from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
+    from dcmp_hil.ipc.child_process import ParentProcess
     from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.statistics import Statistics
 
@@ -92,13 +93,13 @@ class WorkerState(NamedTuple):
     slowest: int = 0  # position of the sink that is furthest behind
 
 
-def main(connection: int, setup: int, terminal: int) -> None:
+def main(parent: ParentProcess, terminal: int) -> None:
     """Serve, then leave.
 
     Parameters
     ----------
-    connection, setup
-        Descriptors of a socket, and of a pickled Setup.
+    parent
+        The run, which gives a WorkerSetup.
     terminal
         Descriptor for the run's own lines; descriptor 2 takes what libraries write.
     """
@@ -107,18 +108,16 @@ def main(connection: int, setup: int, terminal: int) -> None:
         signal.signal(number, signal.SIG_IGN)
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    parent = os.getppid()
-    data = os.pread(setup, os.fstat(setup).st_size, 0)
-    with socket.socket(fileno=connection) as channel:
-        _TelemetryWorker(pickle.loads(data), channel, parent).serve()  # noqa: S301 - written by our own parent
+    with parent.channel:
+        _TelemetryWorker(parent.setup, parent).serve()
     if any(thread.name == THREAD for thread in threading.enumerate()):
         sys.stderr.flush()
         os._exit(0)  # Rerun's own ending waits for a frozen viewer for ever
 
 
 class _TelemetryWorker:
-    def __init__(self, setup: WorkerSetup, channel: socket.socket, parent: int) -> None:
-        self._setup, self._channel, self._parent = setup, channel, parent
+    def __init__(self, setup: WorkerSetup, parent: ParentProcess) -> None:
+        self._setup, self._channel, self._parent = setup, parent.channel, parent
         self._keeper = SharedMemorySink(setup.kept) if setup.kept else None
         self._figures = SummarySink(setup.statistics, self._keeper)
         self._ring = Ring(setup.capacity, mapped(setup.ring, size_of(setup.capacity)))
@@ -142,12 +141,12 @@ class _TelemetryWorker:
             waiting.register(self._channel, select.EPOLLIN)
             while True:
                 waiting.poll(BLOCK_PERIOD_S / self._setup.speed)
-                ended = self._take_events() or os.getppid() != self._parent
+                ended = self._take_events() or not self._parent.lives
                 self._dispatch()
                 if ended:
                     break
         self._say(FIGURES)
-        end = how_it_died(self._setup.mailbox, self._parent)
+        end = how_it_died(self._setup.mailbox, self._parent.pid)
         if end:
             self._tell(Event(self._ring.newest, "ERROR", EventKind.END, end.sentence))
         self._close()
@@ -215,7 +214,7 @@ class _TelemetryWorker:
     def _close(self) -> None:
         """Close the other sinks, the last one first; one that takes its time is waited for at the end."""
         clock = MonotonicClock()
-        orphaned = os.getppid() != self._parent
+        orphaned = not self._parent.lives
         end_ns = clock.now_ns() + int((_ORPHAN_CLOSE_TIMEOUT_S if orphaned else _CLOSE_TIMEOUT_S) * 1e9)
         late = [
             service for service in reversed(self._services) if not service.finish(_ORDERED_FINISH_TIMEOUT_S)
