@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.error_metrics import Estimates, Figures, judge, sampling
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer
     from dcmp_hil.offline.recording import LoggedSignals
 
-_GAP_PERIODS_MAX = 10.02  # periods: the observers restart after a longer one
+_RESTART_PERIODS = GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS  # the observers restart after a longer gap
 _ROUNDING_S = 1e-6  # s: the row at `start` itself stays out, however the file writes its time
 _ESTIMATE_MAX = 1e100  # rad, rad/s, rad/s2: squared, it still is a number
 
@@ -80,7 +81,7 @@ def replay(recording: LoggedSignals, settings: ReplaySettings | None = None) -> 
     """
     settings = settings or ReplaySettings()
     set_up = prepare(recording, settings)
-    period, gap = set_up.setting.period, _GAP_PERIODS_MAX * set_up.setting.period
+    period, gap = set_up.setting.period, _RESTART_PERIODS * set_up.setting.period
     begins = recording.begins(gap)
     reference = zero_phase(
         recording.time,

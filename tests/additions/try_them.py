@@ -14,6 +14,7 @@ from dcmp_hil.config.suggestions import for_unknown_kind
 from dcmp_hil.device.links.listen_only import make_listening_link
 from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed
+from dcmp_hil.offline import ReplaySettings
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.telemetry.signals import by_plot
 from sim_backend.faults.fault_spec import FaultSpec
@@ -67,6 +68,7 @@ def main() -> None:
             "LuenbergerSettings" in schema,
             "observer.bandwidth_rad_s" in _tunables(_OBSERVER),
             _change(_OBSERVER, "observer.bandwidth_rad_s=50").tuning == 50.0,
+            ReplaySettings(observer="luenberger").section.kind == "luenberger",
         ],
         "controller": [
             "ProportionalSettings" in schema,

@@ -6,6 +6,11 @@ from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ProtocolError
 from dcmp_hil.values import Estimate, Sample
 
+GAP_PERIODS_MAX = 10
+"""Periods; after a longer gap nothing is left to continue from, and an observer restarts."""
+STEP_TOLERANCE_PERIODS = 0.02
+"""Periods: a step this close to a whole number of periods counts as that."""
+
 
 class Observer(Protocol):
     """Protocol of an observer: sample in, estimate out."""
@@ -41,4 +46,4 @@ def standing_still(before: float, t: float) -> ProtocolError:
     )
 
 
-__all__ = ["Observer", "ObserverContext", "standing_still"]
+__all__ = ["GAP_PERIODS_MAX", "STEP_TOLERANCE_PERIODS", "Observer", "ObserverContext", "standing_still"]

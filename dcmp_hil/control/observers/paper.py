@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from dcmp_hil.common.section import Positive
-from dcmp_hil.control.observers import standing_still
+from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
 from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
 
@@ -108,7 +108,7 @@ class PaperObserver:
         self._n2_gain = _LAMBDA2 * math.sqrt(M)
         self._n3_gain = _LAMBDA3 * M
         self._from_zero = from_zero
-        self._restart_after = 10.02 * context.period
+        self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
         self._t = self._y = math.nan
         self._z1 = self._z2 = 0.0
         self.v1 = self.v2 = self.v3 = 0.0

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.observers import standing_still
+from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
 from dcmp_hil.control.observers.discretisation import ObserverGains, copy_step, luenberger_copy, matched_gains
 from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
     from dcmp_hil.control.observers.settings import ObserverLimits
 
-_GAP_PERIODS_MAX = 10  # periods; after a longer one nothing is left to continue from
-_STEP_TOLERANCE_PERIODS = 0.02  # of a period: a step this close to a whole number of periods counts as that
 _WATCH_BANDWIDTH_RATIO, _WATCH_BANDWIDTH_MAX_RAD_S = 2.5, 100.0  # times the rule; rad/s
 _MU0_RULE_RATIO_MAX = 3.0
 _BANDWIDTH_MIN_RAD_S = 4.0
@@ -168,7 +166,7 @@ class SuperTwisting:
         mu0: float | None = None,
     ) -> None:
         self._period = context.period
-        self._tolerance = _STEP_TOLERANCE_PERIODS * context.period
+        self._tolerance = STEP_TOLERANCE_PERIODS * context.period
         self._shortest, self._longest = self._period - self._tolerance, self._period + self._tolerance
         self._f0, self._ku = context.model.f0, context.model.ku
         self._use(tune(context, L1=L1, L2=L2, M=M, mu0=mu0))
@@ -242,7 +240,7 @@ class SuperTwisting:
         """Return the coefficients for a step of another length; None if the state cannot be continued."""
         if dt <= 0.0:
             raise standing_still(self._t, self._t + dt)
-        if not dt < _GAP_PERIODS_MAX * self._period + self._tolerance:  # NaN: the first sample
+        if not dt < GAP_PERIODS_MAX * self._period + self._tolerance:  # NaN: the first sample
             return None
         n = round(dt / self._period)
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
@@ -262,7 +260,7 @@ def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0
     counts, period, f0 = context.counts_per_rev, context.period, context.model.f0
     M = slope_bound(counts) if M is None else M
     mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
-    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, _GAP_PERIODS_MAX + 1)}
+    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, GAP_PERIODS_MAX + 1)}
     return Tuning(L1, L2, M, mu0, gaps.pop(1), gaps)
 
 
