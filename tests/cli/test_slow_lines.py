@@ -65,7 +65,7 @@ def test_line_that_damages_too_much_to_arm_is_told_as_that(cli: Cli, way: str, s
 def health_only(carrier: str) -> Iterator[str]:
     """Say nothing but HEALTH, ten times a second and more."""
     encode = cobs.encode if carrier == "cobs" else slcan.encode
-    with line(encode(pack(Health(0, 0, 0, 0, 0, 50)))) as far:
+    with line(encode(pack(Health._make([0] * len(Health._fields))))) as far:
         yield far.path
 
 

@@ -112,7 +112,7 @@ def test_link_is_told_of_once_a_second_and_only_where_there_is_one() -> None:
     assert list(counts) == [*HOST_COUNTERS, *DEVICE_COUNTERS]
     assert (counts["lost"], counts["corrupt"]) == (3.0, 1.0)
     assert np.isnan(counts["crc_errors"])
-    backend.health = Health(7, 0, 0, 0, 2, 90)
+    backend.health = Health._make([0] * len(Health._fields))._replace(crc_errors=7, late_ticks=2)
     for k in range(1000):
         watch.look(3.0 + 1e-3 * k)
     assert _counters(told[-1])["crc_errors"] == 7.0

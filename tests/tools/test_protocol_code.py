@@ -16,8 +16,11 @@ from cffi import FFI
 
 from tests.firmware.core_library import CORE, WARNINGS, compiler
 from tools.protocol import c_code, python_code
+from tools.protocol import dbc as protocol_dbc
+from tools.protocol.__main__ import PAGE
 from tools.protocol.dbc import load
 from tools.protocol.layout import layouts
+from tools.protocol.page import page
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -180,6 +183,28 @@ def test_c_packs_and_unpacks_as_cantools_does(core: tuple[FFI, Any], name: str) 
 
 def test_c_has_the_values(core: tuple[FFI, Any]) -> None:
     assert (core[1].DCMP_ROUND, core[1].DCMP_SQUARE, core[1].DCMP_WIDE) == (1, 2, 0x010)
+
+
+# ------------------------------------------------------------------------------------ one field more
+
+
+def test_a_field_is_typed_in_the_dbc_alone() -> None:
+    """HEALTH gets a temperature by its row in our DBC; everything that is generated has it then."""
+    text = protocol_dbc.DBC.read_text("utf-8")
+    old, crc = (
+        "BO_ 176 HEALTH: 7 DEVICE",
+        'idle_percent : 40|8@1+ (1,0) [0|100] "%" HOST\n SG_ crc8 : 48|8@1+',
+    )
+    row = ' SG_ temperature_C : 48|8@1- (1,0) [-128|127] "degC" HOST\n SG_ crc8 : 56|8@1+'
+    assert (text.count(old), text.count(crc)) == (1, 1)
+    text = text.replace(old, "BO_ 176 HEALTH: 8 DEVICE").replace(crc, crc.partition("\n")[0] + "\n" + row)
+    found = layouts(load(text))
+    assert "    temperature_C: int  # -128..127 degC\n" in python_code.messages(found)
+    assert '_HEALTH = Struct("<BBBBBBb")\n' in python_code.layouts(found)
+    assert "    int8_t temperature_C;\n" in c_code.header(found)
+    assert "    put(&frame->data[6], (uint8_t)message->temperature_C, 1);\n" in c_code.pack(found)
+    assert "    message->temperature_C = (int8_t)frame->data[6];\n" in c_code.unpack(found)
+    assert "`temperature_C` 48, s8 degC" in page(PAGE.read_text("utf-8"), load(text), found, 0)
 
 
 # --------------------------------------------------------------------------- layouts that are none

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from dcmp_hil.wire.frame import Frame
 
 EXAMPLES = settings(deadline=None, max_examples=150)
-FIRST, SECOND = pack(Hello(0x1200, 0x00C0FFEE), 3), pack(Health(0, 1, 0, 255, 0, 99), 3)
+HEALTH = Health._make([0] * len(Health._fields))._replace(sequence_gaps=1, bus_offs=255, idle_percent=99)
+FIRST, SECOND = pack(Hello(0x1200, 0x00C0FFEE), 3), pack(HEALTH, 3)
 ANSWERS = (b"", b"z", b"Z", b"V0101", b"NDCMP", b"F00", b"\x07", b"\x07\x07z", b"V1013", b"N0A1Z", b"F8A")
 
 
