@@ -202,6 +202,7 @@ class SuperTwisting:
         self._v2 = v2 = v2 + k2 * b
         self._v3 = v3 = v3 + k3 * b
         self._t, self._y, self._z1, self._z2 = t, y, z1, z2
+        # 0.09 us less than the constructor
         return make(Estimate, (z1 + v1, z2 + v2 + self._L1 * v1, v3 + self._w2 * v2 + self._w1 * v1))
 
     def retune(self, tuning: Tuning) -> None:

@@ -25,6 +25,7 @@ class SineWave(NamedTuple):
         amplitude, rate, phase, offset = self
         angle = rate * t + phase
         swing = amplitude * math.sin(angle)
+        # 0.09 us less than the constructor
         return make(Reference, (offset + swing, amplitude * rate * math.cos(angle), -rate * rate * swing))
 
 
