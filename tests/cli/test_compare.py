@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from dcmp_hil.cli import console
 from tests.offline.synthetic import swing, write
 from tests.recording.test_reexecute import record
 from tests.telemetry.runs import values
@@ -115,7 +116,7 @@ def test_variants_stand_on_top_of_set_and_are_columns_of_the_table(
     )
     both = figures(cli, run, "--mu0", "70", "--set", "controller.kind=pd")
     assert compared[1]["demand_tv_V_s"] == both["demand_tv_V_s"]["again"]
-    monkeypatch.setenv("COLUMNS", "150")
+    monkeypatch.setattr(console, "out", console.SafeConsole(soft_wrap=True, width=150))
     table = cli("replay", run, *base).out
     for label in ("recorded", "observer.mu0_rad_s=70", "observer.kind=paper", "controller.kind=pd"):
         assert label in table
