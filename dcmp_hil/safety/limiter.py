@@ -111,14 +111,13 @@ class Limiter:
         t, position, _, _ = sample
         governed = self._governor.bound(t, reference) if self._governor else reference
         x, _, _ = reference
-        if governed is reference and -self._error <= x - position <= self._error:
+        if governed is reference and abs(x - position) <= self._error:
             return reference
         return self._judged(sample, reference, governed)
 
     def limit_voltage(self, t: float, demand: float, last: float) -> float:
         """Return the demand, V, or what of it is allowed after `last` V."""
-        most = self.voltage_limit
-        if not -most <= demand <= most or self._slews:
+        if not abs(demand) <= self.voltage_limit or self._slews:
             demand = self._limited_voltage(t, demand, last)
         self._change += demand - last if demand > last else last - demand
         self._left -= 1

@@ -72,14 +72,14 @@ class RangeMonitor:
         """Object outside the limits."""
         t, position, _, _ = sample
         _, velocity, _ = estimate
-        if not -self.velocity_max <= velocity <= self.velocity_max:
+        if not abs(velocity) <= self.velocity_max:
             return TripRequest(
                 "speed",
                 f"Estimated velocity {velocity:.2f} rad/s at t = {t:.3f} s, by "
                 f"{self._seen_by}; the limit is {self._velocity:g} rad/s.",
                 "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
             )
-        if not -self._position <= position <= self._position:
+        if not abs(position) <= self._position:
             return TripRequest(
                 "travel",
                 f"Position {position:.2f} rad at t = {t:.3f} s; the limit is {self._position:g} rad.",
@@ -140,10 +140,10 @@ class DisturbanceWatch:
         """
         self._remember(sample)
         _, velocity, w = seen = self._update(sample)
-        if not -self._velocity_max <= velocity <= self._velocity_max and self._ranges is not None:
+        if not abs(velocity) <= self._velocity_max and self._ranges is not None:
             return self._ranges.check(sample, seen)
         self._filtered = filtered = w + self._keep * (self._filtered - w)
-        if -self._limit <= filtered <= self._limit:
+        if abs(filtered) <= self._limit:
             self._above = 0
             return None
         self._above += 1

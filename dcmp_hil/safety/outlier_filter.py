@@ -47,7 +47,7 @@ class OutlierFilter:
         """Return whether to read on: this sample's position is off, and may be left out."""
         self._samples += 1
         t, x, _, _ = sample
-        if -self._usual <= x - self._x <= self._usual:
+        if abs(x - self._x) <= self._usual:
             self._t, self._x = t, x
             return False
         return self._is_off(sample)

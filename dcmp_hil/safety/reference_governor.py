@@ -77,10 +77,10 @@ class ReferenceGovernor:
         if self.leads:
             return self._led(dt, reference)
         if not (
-            -self._v <= v <= self._v
-            and -self._a <= a <= self._a
-            and -self._x <= x + self._stop * v * abs(v) <= self._x
-            and -self._x <= x <= self._x
+            abs(v) <= self._v
+            and abs(a) <= self._a
+            and abs(x + self._stop * v * abs(v)) <= self._x
+            and abs(x) <= self._x
         ):
             return self._begin(dt, reference)
         if not abs(x - self.last.position) <= self._v * dt and not self._may_jump(t, x):
