@@ -55,7 +55,7 @@ def value_of(rig: Rig, key: str) -> Any:
     return by_rule(section, name, rig) if value is None else value
 
 
-def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
+def changed(rig: Rig, overrides: Sequence[str], *, variation: bool = True) -> tuple[Rig, Change]:
     """Check overrides of a running rig; return the new rig and the change to apply.
 
     Parameters
@@ -64,6 +64,9 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
         As it runs.
     overrides
         `key=value` in dotted form.
+    variation
+        Whether to work out the variation that is expected of the voltage. That evaluates the reference, and
+        so reads the file of one: a replay judges no variation, and must not read what a recording names.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def changed(rig: Rig, overrides: Sequence[str]) -> tuple[Rig, Change]:
         )
     if after.reference != rig.reference and (faults := beyond_reach(after)):
         raise ConfigError(*faults)
-    return after, _worked_out(rig, after)
+    return after, _worked_out(rig, after, variation=variation)
 
 
 def doubts(before: Rig, after: Rig) -> list[str]:
@@ -135,7 +138,7 @@ def _known(rig: Rig, key: str) -> bool:
     return True
 
 
-def _worked_out(before: Rig, after: Rig) -> Change:
+def _worked_out(before: Rig, after: Rig, *, variation: bool) -> Change:
     gains = tuning = None
     if isinstance(after.controller, ControllerSettings) and after.controller != before.controller:
         gains = after.controller.gains
@@ -144,7 +147,8 @@ def _worked_out(before: Rig, after: Rig) -> Change:
     reference = after.reference.source() if after.reference != before.reference else None
     values = _different(before, after)
     words = _in_words(before, values)
-    return Change(words, values, gains, tuning, reference, expected_variation(after))
+    expected = expected_variation(after) if variation else None
+    return Change(words, values, gains, tuning, reference, expected)
 
 
 def _different(before: Rig, after: Rig) -> dict[str, float | str]:

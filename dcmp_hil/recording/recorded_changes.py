@@ -40,7 +40,7 @@ def changes_in(events: Sequence[Event], rig: Rig, *, whole: bool = True) -> list
             # JSON's numbers and texts are TOML's, and come back to the bit.
             overrides = [f"{key}={json.dumps(value)}" for key, value in event.data.values.items()]
             try:
-                rig, change = changed(rig, overrides)
+                rig, change = changed(rig, overrides, variation=False)
             except ConfigError:
                 if whole:
                     raise

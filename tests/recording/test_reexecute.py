@@ -18,6 +18,7 @@ from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.writer import RecordingSink
+from dcmp_hil.values import ChangeData, Event, EventKind
 from tests.helpers import bench, named
 from tests.live.here import ChangedRun
 from tests.telemetry.runs import values
@@ -281,3 +282,14 @@ def test_a_run_keeps_its_recording_unless_told_not_to(tmp_path: Path, cli: Cli) 
     read = read_run(folder)
     assert (len(read.rows), read.run["note"], read.complete) == (1000, "warm motor", True)
     assert read.events[-1].text == "amplifier at 0 V"
+
+
+def test_a_change_is_repeated_without_the_file_of_the_reference(tmp_path: Path) -> None:
+    file = tmp_path / "reference.csv"
+    file.write_text("time_s,position_rad\n0,0\n1,0.5\n")
+    rig = bench("reference.kind=csv", f"reference.file={file}")
+    rig = rig.model_copy(update={"reference": rig.reference.model_copy(update={"file": "/never/there.csv"})})
+    event = Event(0.5, "INFO", EventKind.CHANGE, "", ChangeData({"controller.kp_1_s2": 5000.0}))
+    ((t, change),) = changes_in([event], rig)
+    assert (t, change.variation) == (0.5, None)
+    assert change.gains is not None
