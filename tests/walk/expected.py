@@ -30,7 +30,11 @@ _RUN_SAYS = (
 )
 _SAYS: Mapping[str, tuple[str, ...]] = {
     "run": _RUN_SAYS,
-    "replay": (r"wrote \S+", r"warning: .*", r"note: .*"),
+    "replay": (
+        *(r"wrote \S+", r"warning: .*", r"note: .*"),
+        *(r'(?:[^:"]+: )?(?:time|position|velocity|torque|voltage): column ".*" in .* \(.*\)', r"mu0 = .*\."),
+        *(r"Evenly sampled, .*\.", r"The rows are not evenly sampled: .*\.", r"The stamps are .*\."),
+    ),
     "export": (r"wrote \S+",),
     "rigs": (r"wrote \S+", r".*copy.*"),
     "paper": (r"wrote \S+", r"no picture: .*"),
