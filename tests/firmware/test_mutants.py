@@ -45,6 +45,18 @@ def test_broken_code_is_noticed_by_a_test_that_is_there() -> None:
     assert [each.by for each in found[2:4]] == ["does not compile", "the same as the original"]
 
 
+def test_a_named_mutant_in_other_words_is_dropped_whether_the_named_one_is_drawn_or_not() -> None:
+    compiler()
+    named = made("dcmp_watchdog.c", "ttl_ms < watchdog_ms", "ttl_ms <= watchdog_ms")
+    same = made("dcmp_watchdog.c", "ttl_ms < watchdog_ms", "ttl_ms <= (watchdog_ms)")
+    for drawn in ([same, named], [named, same], [same]):
+        found = {each.mutant: each for each in verdicts(drawn, 1, TESTS, named=[named])}
+        by = "the same as another mutant" if drawn[0] is named else "the same as a named mutant"
+        assert (found[same].what, found[same].by) == ("dropped", by)
+        assert all(found[one].what == "survived" for one in drawn if one is named)
+        assert complaints({named.key: "why"}, [named, same], list(found.values())) == []
+
+
 def test_tests_that_fail_without_a_mutant_say_nothing(tmp_path: Path) -> None:
     compiler()
     (tmp_path / "test_broken.py").write_text("def test_broken() -> None:\n    assert False\n", "utf-8")

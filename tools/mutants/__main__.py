@@ -44,7 +44,7 @@ def main() -> int:
         chosen = [chosen[i] for i in sorted(drawn)]
     try:
         named = names(NAMES)
-        found = verdicts(chosen, asked.jobs)
+        found = verdicts(chosen, asked.jobs, named=[mutant for mutant in every if mutant.key in named])
     except (
         RuntimeError,
         pytest.skip.Exception,

@@ -83,10 +83,26 @@ class Workshop:
         built.unlink()
         return library
 
-    def compile(self, mutants: Sequence[Mutant]) -> list[Compiled]:
-        """Compile mutants, each once: what the compiler makes the same of is the same."""
+    def compile(self, mutants: Sequence[Mutant], named: Sequence[Mutant] = ()) -> list[Compiled]:
+        """Compile mutants, each once: what the compiler makes the same of is the same.
+
+        Parameters
+        ----------
+        mutants
+            Those to try.
+        named
+            Those that may live. What the compiler makes the same of as of one of them is dropped, also where
+            that one itself was not drawn.
+        """
+        keys = {mutant.key for mutant in named}
         with ThreadPoolExecutor(self.jobs) as pool:
             compared = list(pool.map(self._compared, enumerate(mutants)))
+            may_live = {
+                (mutant.file, compiled)
+                for mutant, compiled in zip(
+                    named, pool.map(self._compared, enumerate(named, start=len(mutants))), strict=True
+                )
+            }
             known = {
                 (
                     file,
@@ -97,8 +113,12 @@ class Workshop:
             why = []
             for mutant, compiled in zip(mutants, compared, strict=True):
                 key = (mutant.file, compiled or b"")
-                why.append("does not compile" if compiled is None else known.get(key, ""))
-                known.setdefault(key, "the same as another mutant")
+                reason = "does not compile" if compiled is None else known.get(key, "")
+                if not reason and key in may_live and mutant.key not in keys:
+                    reason = "the same as a named mutant"
+                if not reason:
+                    known[key] = "the same as another mutant"
+                why.append(reason)
             libraries = pool.map(
                 lambda given: None if given[1] else self._library(given[0]),
                 zip(enumerate(mutants), why, strict=True),

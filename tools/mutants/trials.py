@@ -72,8 +72,10 @@ def _tried(
     return found
 
 
-def verdicts(mutants: Sequence[Mutant], jobs: int, tests: Sequence[str] = TESTS) -> list[Verdict]:
-    """Compile mutants and run tests on each until one fails.
+def verdicts(
+    mutants: Sequence[Mutant], jobs: int, tests: Sequence[str] = TESTS, named: Sequence[Mutant] = ()
+) -> list[Verdict]:
+    """Compile mutants and run tests on each until one fails; `named` are those that may live.
 
     Raises
     ------
@@ -82,7 +84,7 @@ def verdicts(mutants: Sequence[Mutant], jobs: int, tests: Sequence[str] = TESTS)
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        compiled = Workshop(folder, jobs).compile(mutants)
+        compiled = Workshop(folder, jobs).compile(mutants, named)
         found = _tried(folder, compiled, jobs, tests)
     return [
         Verdict(each.mutant, *found.get(number, ("dropped", each.dropped)))
