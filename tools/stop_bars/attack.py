@@ -87,9 +87,13 @@ def _ask(host: HostileRun, way: str, press: Any) -> tuple[str, int | None]:
 
 
 def _off_after(log: deque[Any], began_us: int) -> float:
-    """Return the s from an instant of the firmware's clock to the first output at 0 V after it."""
-    off = next(output for output in tuple(log) if output.since_us >= began_us and not output.enable)
-    return float(1e-6 * (off.since_us - began_us))
+    """Return the s from an instant of the firmware's clock to its first output at 0 V; 0 without one.
+
+    The device is at 0 V by now. Without such an output it was so before that instant: its watchdog acted
+    between the look at its output and the look at its clock.
+    """
+    off = next((output for output in tuple(log) if output.since_us >= began_us and not output.enable), None)
+    return 0.0 if off is None else float(1e-6 * (off.since_us - began_us))
 
 
 def _late(zero_s: float, answer_s: float, said: str, way: str) -> Iterator[str]:
