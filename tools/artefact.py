@@ -33,7 +33,8 @@ def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
             raise RuntimeError(f"no {tool} here: {INSTALL}")
     said = ""
     for command in (
-        ["cmake", "--preset", "f405", "-B", str(folder)],
+        # The folder may have been configured for the boards of another folder, which CMake remembers.
+        ["cmake", "--preset", "f405", "-B", str(folder), f"-DDCMP_BOARDS={FIRMWARE / 'boards'}"],
         ["cmake", "--build", str(folder), "--clean-first"],
     ):
         done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)  # noqa: S603

@@ -107,7 +107,8 @@ class DisturbanceWatch:
     for_
         s, how long the filtered |w_hat| must stay above the limit.
     ranges
-        Asked first, with the second observer's estimate; None for no limits.
+        Asked where the second observer's velocity is beyond its `velocity_max`; None for no limit. The
+        position is checked by a `RangeMonitor` of its own.
     """
 
     def __init__(

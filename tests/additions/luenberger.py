@@ -1,4 +1,4 @@
-"""An observer for every user, as somebody would add it: one bandwidth, tunable in a run."""
+"""An observer for every user, as a developer would add it: one bandwidth, tunable in a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A controller for every user, as somebody would add it: gains that are ramped in a run."""
+"""A controller for every user, as a developer would add it: gains that are ramped in a run."""
 
 from __future__ import annotations
 

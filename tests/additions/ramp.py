@@ -1,4 +1,4 @@
-"""A reference for every user, as somebody would add it."""
+"""A reference for every user, as a developer would add it."""
 
 import math
 from typing import Literal

@@ -1,4 +1,4 @@
-"""A link for every user, as somebody would add it: COBS frames over a TCP connection on this computer."""
+"""A link for every user, as a developer would add it: COBS frames over a TCP connection on this computer."""
 
 from __future__ import annotations
 

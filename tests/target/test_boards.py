@@ -11,6 +11,7 @@ import pytest
 from tests.target.build import FIRMWARE, build, needed
 from tests.target.rung import BOARDS, RELEASED, rung, sine
 from tests.target.static import PROGRAMS
+from tools import artefact
 from tools.boards import FOLDER, ON_A_PC, PROTOCOL, README, read_boards
 
 if TYPE_CHECKING:
@@ -97,6 +98,22 @@ def test_board_is_one_file(tmp_path: Path) -> None:
             samples[carrier] = target.drive(60, sine)
             assert target.system.enable
     assert max(abs(sample.voltage) for sample in samples["can"]) > 2.0
+    # What is released is this project's boards, also where the folder was configured for others.
+    assert set(artefact.compile_boards(built)) == set(BOARDS)
+
+
+def test_folder_without_boards_is_refused(tmp_path: Path) -> None:
+    configure = [
+        needed("cmake"),
+        "--preset",
+        "f405",
+        "-B",
+        str(tmp_path / "built"),
+        f"-DDCMP_BOARDS={tmp_path}",
+    ]
+    done = subprocess.run(configure, cwd=FIRMWARE, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "No board is in" in done.stderr
 
 
 # --------------------------------------------------------------------------------------------- refusals
