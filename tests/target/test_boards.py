@@ -137,6 +137,14 @@ def test_folder_without_boards_is_refused(tmp_path: Path) -> None:
             "BOARD_ENABLE PA13",
             "BOARD_ENABLE is PA13, a pin of the debug probe. Choose another pin",
         ),
+        *(
+            (
+                "BOARD_ENABLE PB15",
+                f"BOARD_ENABLE {pin}",
+                f"BOARD_ENABLE is {pin}, which may be high in a reset or while firmware is loaded",
+            )
+            for pin in ("PA15", "PB4", "PB10")
+        ),
         ("BOARD_ENABLE PB15", "BOARD_ENABLE PB16", "BOARD_ENABLE is PB16. Write a pin from PA0 to PG15"),
         ("BOARD_ENABLE PB15", "BOARD_ENABLE", "BOARD_ENABLE is . Write a pin from PA0 to PG15"),
         (
