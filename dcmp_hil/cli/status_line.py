@@ -1,9 +1,12 @@
-"""The live status line of a run."""
+"""The live status line of a run, as wide as the terminal allows."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
 
+from rich.cells import cell_len
 from rich.live import Live
 from rich.text import Text
 
@@ -11,12 +14,59 @@ from dcmp_hil.telemetry.statistics import Durations
 from dcmp_hil.values import PhaseData
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
     from dcmp_hil.telemetry.block import Block
     from dcmp_hil.values import Event
 
 _WARNING_STYLE = "yellow"
+_GAP = "  "
+_NEVER_LEFT_OUT = 0
+_FIRST_LEFT_OUT = 5
+
+
+class Field(NamedTuple):
+    """One value of the status line.
+
+    Parameters
+    ----------
+    rank
+        The field with the largest rank is left out first, one with rank 0 never.
+    long, short
+        The value with its name and unit, in words and abbreviated.
+    bare
+        Without a unit; for terminals that are too narrow for anything else.
+    """
+
+    rank: int
+    long: str
+    short: str
+    bare: str = ""
+
+
+def fitted(fields: Sequence[Field], columns: int) -> str:
+    """Return the fields in a line of at most `columns` columns, if those of rank 0 fit.
+
+    The names are words where all fields fit but the one that is left out first; else they are abbreviated,
+    and fields are left out.
+    """
+    long = [field.long for field in fields]
+    if _columns(long) <= columns:
+        return _GAP.join(long)
+    long = [field.long for field in fields if field.rank < _FIRST_LEFT_OUT]
+    if _columns(long) <= columns:
+        return _GAP.join(long)
+    for least in range(_FIRST_LEFT_OUT, _NEVER_LEFT_OUT, -1):
+        short = [field.short for field in fields if field.rank < least]
+        if _columns(short) <= columns:
+            return _GAP.join(short)
+    return _GAP.join(field.bare for field in fields if field.rank == _NEVER_LEFT_OUT)
+
+
+def _columns(parts: Sequence[str]) -> int:
+    return cell_len(_GAP.join(parts))
 
 
 class StatusLine:
@@ -47,7 +97,9 @@ class StatusLine:
         if self._live is None:
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
             self._live.start()
-        self._live.update(self._line(block), refresh=True)
+        self._take_width()
+        line = fitted(self._fields(block), self._console.width)
+        self._live.update(Text(line, no_wrap=True, overflow="crop"), refresh=True)
 
     def event(self, event: Event) -> None:
         """Print warnings; remember the phase. An error is the run's end, which says it itself, once."""
@@ -61,16 +113,28 @@ class StatusLine:
         if self._live is not None:
             self._live.stop()
 
-    def _line(self, block: Block) -> Text:
+    def _take_width(self) -> None:
+        """Take the width of the terminal that is printed on, which a user may change at any time.
+
+        The console itself measures its process's standard streams, which are no terminal in telemetry.
+        """
+        with suppress(OSError, ValueError):  # no file descriptor, or no terminal
+            columns = os.get_terminal_size(self._console.file.fileno()).columns
+            if columns:
+                self._console.width = columns
+
+    def _fields(self, block: Block) -> tuple[Field, ...]:
         lateness = self._lateness.percentiles()
-        parts = (
-            f"{block['t'][-1]:8.2f} s",
-            f"{self._phase:8}",
-            f"position {block['position'][-1]:+7.3f} rad",
-            f"error {1e3 * block.tracking_error[-1]:+7.2f} mrad",
-            f"voltage {block['voltage_sent'][-1]:+6.2f} V",
-            f"w {block['disturbance_estimate'][-1]:+7.2f} rad/s²",
-            f"late {self._late}",
-            f"lateness {lateness.p99:.0f} µs p99, {lateness.max:.0f} max",
+        t, position, voltage = (float(block[name][-1]) for name in ("t", "position", "voltage_sent"))
+        error, w = 1e3 * block.tracking_error[-1], float(block["disturbance_estimate"][-1])
+        late = f"late {self._late}"
+        return (
+            Field(1, f"{t:8.2f} s", f"{t:8.2f} s"),
+            Field(3, f"{self._phase:8}", f"{self._phase:8}"),
+            Field(4, f"position {position:+7.3f} rad", f"pos {position:+7.3f} rad"),
+            Field(0, f"error {error:+7.2f} mrad", f"err {error:+7.2f} mrad", f"err {error:+.2f}"),
+            Field(2, f"voltage {voltage:+6.2f} V", f"u {voltage:+6.2f} V"),
+            Field(0, f"w {w:+7.2f} rad/s²", f"w {w:+7.2f} rad/s²", f"w {w:+.2f}"),
+            Field(0, late, late, late),
+            Field(5, f"lateness {lateness.p99:.0f} µs p99, {lateness.max:.0f} max", ""),
         )
-        return Text("  ".join(parts), no_wrap=True, overflow="crop")

@@ -1,0 +1,117 @@
+"""The status line by the width of the terminal: what is left out first, and what never is."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import struct
+import termios
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+
+from dcmp_hil.cli.status_line import Field, StatusLine, fitted
+from dcmp_hil.values import Event, EventKind, PhaseData
+from tests.telemetry.runs import T, blocks
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+NAMES = re.compile(r"running|pos(?:ition)?|err(?:or)?|voltage|\bu\b|\bw\b|late\b|lateness|[\d.]+ s\b")
+RUNNING = Event(0.0, "INFO", EventKind.PHASE, "it runs", PhaseData("running"))
+WITHOUT_UNIT = 40
+
+
+def line_on(columns: int) -> str:
+    """Return the status line of a run on a terminal of so many columns."""
+    console = Console(width=columns, force_terminal=True, color_system=None)
+    line = StatusLine(console, T)
+    line.event(RUNNING)
+    with console.capture() as shown:
+        for block in blocks(300):  # every 97th period is 700 us late
+            line.block(block)
+        line.close()
+    drawn = [re.sub(r"\x1b\[[^a-zA-Z]*[a-zA-Z]", "", text).strip("\r") for text in shown.get().split("\n")]
+    return [text for text in drawn if "err" in text][-1].rsplit("\r", maxsplit=1)[-1]
+
+
+@pytest.mark.parametrize("columns", [200, 120, 100, 80, 60, 40])
+def test_error_disturbance_and_late_periods_are_on_every_line(columns: int) -> None:
+    line = line_on(columns)
+    assert cell_len(line) <= columns
+    unit = r"" if columns == WITHOUT_UNIT else " mrad"
+    assert re.search(rf"\berr(or)? +[+-]\d+\.\d\d{unit}  ", line), line
+    assert re.search(rf"\bw +[+-]\d+\.\d\d{unit and ' rad/s²'}  ", line), line
+    assert re.search(r"\blate 3\b", line), line
+
+
+@pytest.mark.parametrize(
+    ("columns", "fields"),
+    [
+        (200, ["0.30 s", "running", "position", "error", "voltage", "w", "late", "lateness"]),
+        (120, ["0.30 s", "running", "position", "error", "voltage", "w", "late"]),
+        (100, ["0.30 s", "running", "pos", "err", "u", "w", "late"]),
+        (80, ["0.30 s", "running", "err", "u", "w", "late"]),
+        (60, ["0.30 s", "err", "w", "late"]),
+        (40, ["err", "w", "late"]),
+        (20, ["err", "w"]),
+    ],
+)
+def test_the_least_important_field_is_left_out_first(columns: int, fields: list[str]) -> None:
+    line = line_on(columns)
+    assert NAMES.findall(line) == fields, line
+
+
+def test_no_width_hides_what_a_narrower_one_shows() -> None:
+    def names(columns: int) -> set[str]:
+        long = {"pos": "position", "err": "error", "u": "voltage"}
+        return {long.get(name, name) for name in NAMES.findall(line_on(columns))}
+
+    shown = [names(columns) for columns in range(34, 160, 7)]
+    assert all(narrow <= wide for narrow, wide in pairwise(shown))
+
+
+def test_wide_characters_are_counted_by_columns() -> None:
+    fields = (Field(0, "慢慢慢 1", "慢 1", "慢"), Field(1, "ab", "ab"))
+    assert fitted(fields, 12) == "慢慢慢 1  ab"
+    assert fitted(fields, 11) == "慢 1  ab"
+    assert fitted(fields, 8) == "慢 1  ab"
+    assert fitted(fields, 7) == "慢 1"
+    assert fitted(fields, 3) == "慢"
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, Callable[[int], None]]]:
+    """Yield the end of a pseudo terminal that programs write to, and what sets its width."""
+    ours, theirs = pty.openpty()
+
+    def resize(columns: int) -> None:
+        fcntl.ioctl(ours, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+
+    yield theirs, resize
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_resize_during_a_run_changes_the_next_line(
+    terminal: tuple[int, Callable[[int], None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs, resize = terminal
+    monkeypatch.setenv("TERM", "xterm")
+    with os.fdopen(os.dup(theirs), "w") as file:
+        console = Console(file=file, force_terminal=True, color_system=None)
+        line = StatusLine(console, T)
+        widths = [200, 80, 40, 120]
+        for columns, block in zip(widths, blocks(400), strict=False):
+            resize(columns)
+            with console.capture() as shown:
+                line.block(block)
+            (drawn,) = re.findall(r"[^\x1b\r\n]*\blate \d+[^\x1b\r\n]*", shown.get())
+            assert cell_len(drawn) <= columns
+            assert ("lateness" in drawn, " mrad" in drawn) == (columns == 200, columns > 40)
+        line.close()
