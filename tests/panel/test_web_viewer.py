@@ -19,6 +19,7 @@ from tests.panel.test_browser import address_of, free_port
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
     from selenium.webdriver import Chrome
 
 _REPORTS = Path("reports")
@@ -33,12 +34,21 @@ def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-def _coloured(page: Chrome, colour: tuple[int, int, int]) -> int:
-    """Count the pixels of about that colour in the frame."""
+def _pixels(page: Chrome) -> NDArray[np.int16]:
+    """Return what is in the frame, shape (height, width, 3)."""
     picture = page.find_element("id", "viewer").screenshot_as_png
     with Image.open(io.BytesIO(picture)) as image:
-        pixels = np.asarray(image.convert("RGB"), dtype=np.int16)
-    return int((np.abs(pixels - np.array(colour)).max(axis=-1) < 24).sum())
+        return np.asarray(image.convert("RGB"), dtype=np.int16)
+
+
+def _coloured(page: Chrome, colour: tuple[int, int, int]) -> int:
+    """Count the pixels of about that colour in the frame."""
+    return int((np.abs(_pixels(page) - np.array(colour)).max(axis=-1) < 24).sum())
+
+
+def _is_dark(page: Chrome) -> bool:
+    assert page.execute_script("return matchMedia('(prefers-color-scheme: light)').matches")
+    return float(np.median(_pixels(page))) < 60.0
 
 
 def test_the_dashboard_is_drawn_in_the_panel(tmp_path: Path) -> None:
@@ -52,6 +62,7 @@ def test_the_dashboard_is_drawn_in_the_panel(tmp_path: Path) -> None:
             page.get(address_of(panel))
             until(lambda: _coloured(page, VOLTAGE_RGB) > 50, "the voltage was drawn")
             until(lambda: _coloured(page, ERROR_RGB) > 50, "the tracking error was drawn")
+            assert _is_dark(page)  # in a browser that is set to light
             _REPORTS.mkdir(exist_ok=True)
             page.save_screenshot(str(_REPORTS / "panel-web.png"))
             page.find_element("id", "stop").click()

@@ -1,16 +1,33 @@
-"""Fixtures: no process and no shared memory stays behind."""
+"""Fixtures: a viewer that can draw; no process and no shared memory stays behind."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from dcmp_hil.telemetry.rerun import viewer as window
 from tests.telemetry.sinks import children
+from tools.screenshot import APT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+
+_DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+
+
+@pytest.fixture
+def vulkan() -> None:
+    """Skip without a viewer that can draw, saying how to get it; under CI that is a failure."""
+    missing = not any(folder.is_dir() and any(folder.iterdir()) for folder in _DRIVERS)
+    if not (missing or not window.viewer_binary().exists()):
+        return
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"no Vulkan driver, or no viewer: {APT}")
+    pytest.skip(f"no Vulkan driver, or no viewer; {APT}")
 
 
 @pytest.fixture

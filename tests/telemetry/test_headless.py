@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -19,13 +18,11 @@ from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, VOLTAGE_RGB
 from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
 from tools import screenshot as screenshots
-from tools.screenshot import APT, headless_viewer, look, screenshot, wait_until_loaded
+from tools.screenshot import headless_viewer, look, screenshot, wait_until_loaded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
-_MISSING = not any(folder.is_dir() and any(folder.iterdir()) for folder in _DRIVERS)
 _REPORTS = Path("reports")
 _LOOPBACK = {"0100007F", "00000000000000000000000001000000", "0000000000000000FFFF00000100007F"}
 _VIEWS = {
@@ -42,13 +39,7 @@ _VIEWS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _vulkan() -> None:
-    if not (_MISSING or not window.viewer_binary().exists()):
-        return
-    if os.environ.get("CI") == "true":
-        pytest.fail(f"no Vulkan driver, or no viewer: {APT}")
-    pytest.skip(f"no Vulkan driver, or no viewer; {APT}")
+pytestmark = pytest.mark.usefixtures("vulkan")
 
 
 class OpenWindow:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
+from dcmp_hil.telemetry.rerun.font_text import drawable
 from dcmp_hil.telemetry.rerun.scene import log_style
 from dcmp_hil.values import EventKind
 
@@ -73,7 +74,10 @@ class Feed:
     def event(self, event: Event) -> bool:
         """Send an event, behind the periods before it; see `block`."""
         on = event.kind is EventKind.LINK or self.send_rest()  # what an event changes is drawn from there on
-        return on and self.outlet.do(partial(send, self._frames.of_event(event)))
+        shown = event._replace(
+            text=drawable(event.text)
+        )  # here: Arrow takes no surrogates, as paths have them
+        return on and self.outlet.do(partial(send, self._frames.of_event(shown)))
 
     def send_rest(self) -> bool:
         """Send the blocks that wait; see `block`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rerun as rr
 
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.block import Block
@@ -13,9 +12,12 @@ from dcmp_hil.telemetry.rerun.blueprint import dashboard
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.feed import send
 from dcmp_hil.telemetry.rerun.scene import log_scenery
+from dcmp_hil.telemetry.rerun.text_stream import TextStream
 from dcmp_hil.values import Event, EventKind
 
 if TYPE_CHECKING:
+    import rerun as rr
+
     from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 
@@ -35,7 +37,7 @@ def warm_up(rig: RigView, _: rr.RecordingStream) -> None:
     """Make the calls of a block without output: the first take 80 ms, for which the loop would wait."""
     frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
     frames.choose_lines(block)
-    stream = rr.RecordingStream("warm-up")
+    stream = TextStream("warm-up")
     nothing = Event(0.0, "INFO", EventKind.OTHER, "")
     send([*frames.of_start(), *frames.of_block(block), *frames.of_event(nothing)], stream)
     stream.disconnect()

@@ -13,6 +13,7 @@ import rerun.blueprint as rrb
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.telemetry.rerun.blueprint import TIMELINE, opened, plot
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
+from dcmp_hil.telemetry.rerun.text_stream import TextStream
 from dcmp_hil.telemetry.signals import (
     ERROR_RGB,
     ESTIMATE_RGB,
@@ -69,7 +70,7 @@ def write_series(
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
     layout = opened(rrb.Vertical(*(plot(name, window=None) for name in plots)), follow=False)
-    stream = rr.RecordingStream(application)
+    stream = TextStream(application)
     times = [rr.TimeColumn(TIMELINE, duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
 
     def steps() -> Iterator[None]:

@@ -27,6 +27,7 @@ from dcmp_hil.telemetry.rerun.dashboard_warnings import (
 from dcmp_hil.telemetry.rerun.feed import Feed
 from dcmp_hil.telemetry.rerun.recording_start import begin, warm_up
 from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
+from dcmp_hil.telemetry.rerun.text_stream import TextStream
 
 if TYPE_CHECKING:
     import subprocess
@@ -182,8 +183,8 @@ class RerunSink:
             feed.outlet.leave()
             self._feeds.remove(feed)
 
-    def _stream(self) -> rr.RecordingStream:
-        return rr.RecordingStream(self._application, recording_id=self._recording)
+    def _stream(self) -> TextStream:
+        return TextStream(self._application, self._recording)
 
     def _open_file(self, record: Path) -> None:
         try:
@@ -246,7 +247,9 @@ class RerunSink:
     def _serve(self, first_port: int) -> StreamWorker | None:
         """Serve viewers, which may connect at any time; a late one gets the earlier data."""
         for port in window.free_ports(first_port):
-            target = rr.GrpcServerSink(window.LOOPBACK, port, server_memory_limit=self._history)
+            target = rr.GrpcServerSink(
+                window.LOOPBACK, port, server_memory_limit=self._history, newest_first=True
+            )
             outlet = self._open_viewer(target, _CLOSE_TIMEOUT_S)
             if window.serves(port, os.getpid(), _SERVER_START_TIMEOUT_S):
                 self.port = port

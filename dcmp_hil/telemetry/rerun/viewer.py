@@ -32,6 +32,7 @@ _HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(
     (0, 0, 0, 4, 0, 0, 0, 0, 0)
 )  # with empty settings
 _HTTP2_SETTINGS_TYPE = b"\x04"  # type of the frame that every HTTP/2 server answers with
+_WEB_LOOK = "theme=dark&hide_welcome_screen=1"
 _CLOSED_PORT_URL = "http://127.0.0.1:9"  # the port that discards; no server listens there
 _OFFLINE_ENVIRONMENT = {
     "CI": "1",
@@ -173,8 +174,12 @@ def start_viewer(port: int) -> subprocess.Popen[bytes]:
 
 
 def web_url(web_port: int, port: int) -> str:
-    """Return the page on which the web viewer shows what is served on `port`."""
-    return f"http://{LOOPBACK}:{web_port}?url={quote(proxy_url(port), safe='')}"
+    """Return the page on which the web viewer shows what is served on `port`.
+
+    Dark, as the colours of the dashboard are meant, also in a browser that is set to light; and without the
+    page that greets until data are there.
+    """
+    return f"http://{LOOPBACK}:{web_port}?url={quote(proxy_url(port), safe='')}&{_WEB_LOOK}"
 
 
 def start_web_viewer(web_port: int, port: int) -> subprocess.Popen[bytes]:
