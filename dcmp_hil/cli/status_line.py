@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
@@ -126,13 +127,15 @@ class StatusLine:
     def _fields(self, block: Block) -> tuple[Field, ...]:
         lateness = self._lateness.percentiles()
         t, position, voltage = (float(block[name][-1]) for name in ("t", "position", "voltage_sent"))
-        error, w = 1e3 * block.tracking_error[-1], float(block["disturbance_estimate"][-1])
+        error, w = f"{1e3 * block.tracking_error[-1]:+7.2f}", float(block["disturbance_estimate"][-1])
+        if math.isnan(block.tracking_error[-1]):  # nothing is tracked yet
+            error = f"{'-':>7}"
         late = f"late {self._late}"
         return (
             Field(1, f"{t:8.2f} s", f"{t:8.2f} s"),
             Field(3, f"{self._phase:8}", f"{self._phase:8}"),
             Field(4, f"position {position:+7.3f} rad", f"pos {position:+7.3f} rad"),
-            Field(0, f"error {error:+7.2f} mrad", f"err {error:+7.2f} mrad", f"err {error:+.2f}"),
+            Field(0, f"error {error} mrad", f"err {error} mrad", f"err {error.strip()}"),
             Field(2, f"voltage {voltage:+6.2f} V", f"u {voltage:+6.2f} V"),
             Field(0, f"w {w:+7.2f} rad/s²", f"w {w:+7.2f} rad/s²", f"w {w:+.2f}"),
             Field(0, late, late, late),

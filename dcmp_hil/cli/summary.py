@@ -9,21 +9,30 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from dcmp_hil.telemetry.statistics import BOUNDS_US
 from dcmp_hil.wire.link_diagnosis import DeviceCounters
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
-    from dcmp_hil.telemetry.statistics import DurationHistogram
+    from dcmp_hil.telemetry.statistics import DurationHistogram, Percentiles
 
 _BAR_CHARS = " ▁▂▃▄▅▆▇█"
+_UNITS = ((1e-6, "s"), (1e-3, "ms"), (1.0, "µs"))
+_WHOLE_MIN_US = 10_000.0  # longer durations are shown without decimals
+_HOW_OFTEN = (
+    "how often: a bar for each range of durations, up to 1, 2, 5, 10, 20, 50 ... µs,",
+    "from the first range with a cycle to the last; its height is logarithmic.",
+)
 
 
 def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
     """Return tables of the figures (name, value, unit) and of the durations (one quantile a column)."""
     start, stop = result.summary.window_s
     title = Text.assemble((rig.name, "bold"), f"  {start:.2f} to {stop:.2f} s, ended by {ended_by}")
-    return Group(title, "", _figures(result), "", _durations(result), *_refusals(result))
+    return Group(title, "", _figures(result), *_durations(result), *_refusals(result))
 
 
 def _figures(result: Result) -> Table:
@@ -42,9 +51,10 @@ def _figures(result: Result) -> Table:
         ("voltage, peak", _number(figures.voltage_peak_V), "V"),
         ("voltage, total variation", _number(figures.voltage_tv_V_s), "V/s"),
         ("periods", str(figures.periods), f"{figures.late_periods} late, by half a period and more"),
-        ("speed", f"{figures.realtime_factor:.4g}", "x real time"),
+        ("speed", _number(figures.realtime_factor), "x real time"),
     ):
-        table.add_row(what, value, unit)
+        if value:  # what is not known has no row: the errors of an estimate on a device, for one
+            table.add_row(what, value, unit)
     if result.link is not None:
         for row in _link(result):
             table.add_row(*row)
@@ -84,7 +94,7 @@ def _link(result: Result) -> list[tuple[str, str, str]]:
     if "device_clock" in causes:
         rows.append(("[yellow]device's clock", f"{1e2 * shares['device_clock']:+.2f}", "% fast"))
     if result.device_end and result.device_end.fault:
-        rows.append(("[yellow]device's end", result.device_end.fault, "a fault of its own"))
+        rows.append(("[yellow]device's end", result.device_end.fault, "the fault that it keeps"))
     return rows
 
 
@@ -96,21 +106,38 @@ def _at_least(device: DeviceCounters, name: str) -> str:
     return f"{getattr(device, name)}{' or more' if name in device.full else ''}"
 
 
-def _durations(result: Result) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
-    table.add_column("µs", no_wrap=True)
-    for quantile in ("p50", "p99", "p99.9", "max"):
-        table.add_column(quantile, justify="right", no_wrap=True)
-    table.add_column("how many, by 1, 2, 5, 10 …", no_wrap=True, style="dim")
+def _durations(result: Result) -> list[RenderableType]:
+    """Return the table of durations, without those that say nothing: virtual time has no lateness."""
     figures = result.summary
-    for what, values, histogram in (
+    durations = [
         ("period", figures.period_us, figures.period_histogram),
         ("lateness", figures.lateness_us, figures.lateness_histogram),
         ("sample to command", figures.compute_us, figures.compute_histogram),
-    ):
-        quantiles = (f"{v:.1f}" for v in (values.p50, values.p99, values.p999, values.max))
-        table.add_row(what, *quantiles, _bars(histogram))
-    return table
+    ]
+    told = [(what, values, histogram) for what, values, histogram in durations if _varies(values)]
+    if not told:
+        return []
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
+    rows = [(what, *_quantiles(values), _bars(histogram)) for what, values, histogram in told]
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]  # only bars may be cut off
+    table.add_column("µs", no_wrap=True, min_width=widths[0])
+    for quantile, width in zip(("p50", "p99", "p99.9", "max"), widths[1:], strict=False):
+        table.add_column(quantile, justify="right", no_wrap=True, min_width=max(width, len(quantile)))
+    table.add_column("how often", no_wrap=True, style="dim")
+    for row in rows:
+        table.add_row(*row)
+    return ["", table, *(Text(line, style="dim") for line in _HOW_OFTEN)]
+
+
+def _varies(values: Percentiles) -> bool:
+    """Return whether durations were measured: NaN is none, and those of the virtual clock are the same."""
+    return values.max > 0.0 and values.max != values.p50
+
+
+def _quantiles(values: Percentiles) -> list[str]:
+    return [
+        f"{v:.{0 if v >= _WHOLE_MIN_US else 1}f}" for v in (values.p50, values.p99, values.p999, values.max)
+    ]
 
 
 def _bars(histogram: DurationHistogram) -> str:
@@ -119,7 +146,16 @@ def _bars(histogram: DurationHistogram) -> str:
         return ""
     most = math.log1p(max(histogram.counts))
     bars = "".join(_BAR_CHARS[math.ceil(8 * math.log1p(count) / most)] for count in histogram.counts)
-    return f"≤{histogram.up_to_us[0]:g} {bars} ≤{histogram.up_to_us[-1]:g}"
+    first, last = (_bound(histogram.up_to_us[place]) for place in (0, -1))
+    return f"{first} {bars} {last}"
+
+
+def _bound(up_to_us: float) -> str:
+    """Return a bound with its unit, such as `≤500 µs`."""
+    if math.isinf(up_to_us):
+        return f">{1e-6 * BOUNDS_US[-1]:g} s"
+    scale, unit = next((one for one in _UNITS if up_to_us >= 1.0 / one[0]), _UNITS[-1])
+    return f"≤{scale * up_to_us:g} {unit}"
 
 
 def _refusals(result: Result) -> list[Text]:
@@ -132,4 +168,5 @@ def _refusals(result: Result) -> list[Text]:
 
 
 def _number(value: float | None, scale: float = 1.0) -> str:
-    return "unknown" if value is None else f"{scale * value:.4g}"
+    """Return a figure; nothing where it is not known."""
+    return "" if value is None or math.isnan(value) else f"{scale * value:.4g}"

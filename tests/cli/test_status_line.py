@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import math
 import os
 import pty
 import re
@@ -74,6 +75,17 @@ def test_no_width_hides_what_a_narrower_one_shows() -> None:
 
     shown = [names(columns) for columns in range(34, 160, 7)]
     assert all(narrow <= wide for narrow, wide in pairwise(shown))
+
+
+def test_an_error_before_the_trajectory_is_a_dash() -> None:
+    console = Console(width=80, force_terminal=True, color_system=None)
+    line = StatusLine(console, T)
+    with console.capture() as shown:
+        for block in blocks(20):
+            block["began"][:] = math.inf
+            line.block(block)
+    assert "err       - mrad" in shown.get()
+    assert "nan" not in shown.get()
 
 
 def test_wide_characters_are_counted_by_columns() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -135,7 +136,7 @@ def test_run_ends_well_when_its_terminal_is_closed(installed: Path, tmp_path: Pa
 
 def test_run_prints_figures_in_an_encoding_that_lacks_signs(script: Script, tmp_path: Path) -> None:
     done = script(
-        *("run", "--fast", "--duration", "1", "--viewer", "none"),
+        *("run", "--fast", "--duration", "1", "--viewer", "none", "--fault", "host.slow:ms=3,at=500ms"),
         env={"PYTHONIOENCODING": "latin-1:strict"},
         encoding="latin-1",
     )
@@ -144,8 +145,9 @@ def test_run_prints_figures_in_an_encoding_that_lacks_signs(script: Script, tmp_
     assert "Traceback" not in done.err
     assert "velocity error, RMS" in done.out
     (heading,) = (line for line in done.out.splitlines() if "p50" in line)
-    (durations,) = (line for line in done.out.splitlines() if line.startswith("lateness"))
+    (durations,) = (line for line in done.out.splitlines() if line.startswith("sample to command"))
     assert heading.index("p50") == durations.index("0.0")  # the columns are as wide as ever
+    assert re.search(r"<1 µs [-._=+*%# ]+ <5 ms", durations)
 
 
 @pytest.mark.parametrize(
