@@ -43,7 +43,7 @@ def dashboard(view: RigView, record: Path | None, viewer: Viewer, port: int) -> 
     from dcmp_hil.telemetry.rerun.sink import RerunSink  # takes half a second
 
     use_terminal()
-    return watched(RerunSink(view, record, viewer, port=port, spare=True), viewer)
+    return watched(RerunSink(view, record, viewer, port=port, spare=True, optimised=True), viewer)
 
 
 def dashboard_replacing(view: RigView, record: Path, viewer: Viewer, port: int) -> Sink:

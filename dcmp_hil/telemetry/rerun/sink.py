@@ -25,6 +25,7 @@ from dcmp_hil.telemetry.rerun.dashboard_warnings import (
     stuck,
 )
 from dcmp_hil.telemetry.rerun.feed import Feed
+from dcmp_hil.telemetry.rerun.optimised_file import optimise
 from dcmp_hil.telemetry.rerun.recording_start import begin, warm_up
 from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
 from dcmp_hil.telemetry.rerun.text_stream import TextStream
@@ -50,6 +51,7 @@ _SERVER_MEMORY_LIMIT = "64MiB"
 _RESEND_PERIOD_S = 10.0  # s
 _FILE_BLOCK_DURATION_S = 1.0  # s of a run that go into a file at once
 _VIEWER_TIMEOUT_S = 5.0  # s, for a viewer that is
+_OPTIMISE_TIMEOUT_S = 5.0  # s, for a file that is whole already
 _START_DATA_BYTES = 400e3  # bytes: scenery and layout are 250 kB
 
 
@@ -76,6 +78,8 @@ class RerunSink:
         Whether the file ends, with a warning, while its disk still has room for the data of the run.
     history
         What late viewers get at most, such as ``64MiB``.
+    optimised
+        Whether `close` rewrites the file with a footer and longer chunks, if that takes 5 s at most.
 
     Attributes
     ----------
@@ -101,6 +105,7 @@ class RerunSink:
         *,
         spare: bool = False,
         history: str = _SERVER_MEMORY_LIMIT,
+        optimised: bool = False,
     ) -> None:
         self.warnings: list[str] = []
         self.port: int | None = None
@@ -110,6 +115,7 @@ class RerunSink:
         self._needed = kept_for_data(record) if record is not None and spare else 0.0
         self._application, self._recording = application, str(uuid4())
         self._history = history
+        self._optimised = optimised
         rr.unregister_shutdown()
         if record is not None:
             self._open_file(record)
@@ -147,6 +153,9 @@ class RerunSink:
         for feed in self._feeds:
             try:
                 feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
+                if self._optimised and (file := feed.outlet.written()):
+                    left = max(0, end_ns - clock.now_ns()) * 1e-9
+                    optimise(file, min(left, _OPTIMISE_TIMEOUT_S), self._needed)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
                 faults.append(incomplete(feed.outlet, str(error)))
         if faults:

@@ -6,6 +6,7 @@ import os
 import threading
 import weakref
 from contextlib import suppress
+from pathlib import Path
 from queue import Full, Queue
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,6 @@ from dcmp_hil.platform.disk_space import room_for, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     import rerun as rr
 
@@ -82,6 +82,15 @@ class StreamWorker:
         if self._opened is not None:
             return os.fstat(self._opened).st_size
         return 0 if self.file is None else size_of(self.file)
+
+    def written(self) -> Path | None:
+        """Return the file by the name that it has by now; None for a viewer."""
+        if self._opened is None:
+            return self.file
+        try:
+            return Path(f"/proc/self/fd/{self._opened}").readlink()
+        except OSError:  # not Linux
+            return self.file
 
     @property
     def stalled(self) -> float:
