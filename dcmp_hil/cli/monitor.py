@@ -6,13 +6,20 @@ from typing import Annotated
 
 import typer
 
-from dcmp_hil.cli.options import Overrides, RigName
+from dcmp_hil.cli.options import Overrides, RigName, duration_of
 
 
 def monitor(
     rig: RigName = "bench-serial",
     overrides: Overrides = None,
-    duration: Annotated[float, typer.Option(metavar="S", help="Length, s; 0 = until Ctrl-C.")] = 0.0,
+    duration: Annotated[
+        float,
+        typer.Option(
+            metavar="TIME",
+            parser=duration_of("--duration"),
+            help="Length, such as 10s or 2min; 0 = until Ctrl-C.",
+        ),
+    ] = 0.0,
     all_frames: Annotated[
         bool, typer.Option("--all", help="Print every SAMPLE and DRIVE, not ten a second.")
     ] = False,

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from dcmp_hil.common.durations import seconds
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 RigName = Annotated[
     str, typer.Argument(metavar="RIG", help="A shipped rig (see `dcmp-hil rigs`) or a rig.toml of your own.")
@@ -18,3 +24,15 @@ JsonFile = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE", help="Write the figures as JSON; - for standard output."),
 ]
+
+
+def duration_of(option: str) -> Callable[[str | float], float]:
+    """Return what reads the value of an option: a duration such as `10s`, `200ms` or `2min`, in s."""
+
+    def read(value: str | float) -> float:
+        try:
+            return seconds(value) if isinstance(value, str) else value  # a default is a number
+        except ValueError as error:
+            raise ConfigError(f"{option}: {error}") from None
+
+    return read

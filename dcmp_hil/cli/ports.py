@@ -8,6 +8,11 @@ from typing import Annotated
 import typer
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.options import duration_of
+from dcmp_hil.common.number_range import NumberRange
+from dcmp_hil.errors import ConfigError
+
+_WAIT_RANGE_S = NumberRange(0.1, 60.0)
 
 
 def ports(
@@ -23,7 +28,11 @@ def ports(
     ] = 1_000_000,
     wait: Annotated[
         float,
-        typer.Option(metavar="S", min=0.1, max=60, help="Wait for the first sample: some boards boot first."),
+        typer.Option(
+            metavar="TIME",
+            parser=duration_of("--wait"),
+            help="Wait for the first sample, 100ms to 60s: some boards boot first.",
+        ),
     ] = 0.25,
     verbose: Annotated[
         bool,
@@ -40,6 +49,9 @@ def ports(
     adapter stays silent, because only a command opens it: `run` and slcand do so. An open CAN adapter
     takes part in its bus: give the right --bitrate.
     """
+    if not _WAIT_RANGE_S.holds(wait):
+        raise ConfigError(f"--wait: got {wait:g} s; expected 100ms to 60s.")
+
     from rich.text import Text
 
     from dcmp_hil.device.discovery import find_devices

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from dcmp_hil.cli.options import Force, JsonFile
+from dcmp_hil.cli.options import Force, JsonFile, duration_of
 
 _COLUMNS = "Columns and units (found by name where not given)"
 _FILE = "What the file does not say"
 _OBSERVER = "Observer and rig"
 _FIGURES = "Figures"
 _OUTPUT = "Output"
+_TIME = "TIME"  # with a unit, such as 2ms
 
 
 class InputAt(StrEnum):
@@ -38,7 +39,8 @@ def _unit(quantity: str, units: str) -> Any:
 
 
 def _number(*flags: str, unit: str, text: str, panel: str = _OBSERVER) -> Any:
-    return typer.Option(*flags, metavar=unit, help=text, rich_help_panel=panel)
+    parser = duration_of(flags[0]) if unit == _TIME else None
+    return typer.Option(*flags, metavar=unit, help=text, rich_help_panel=panel, parser=parser)
 
 
 def replay(  # noqa: PLR0913 - typer reads the options from the signature
@@ -63,7 +65,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         float | None,
         _number(
             "--period",
-            unit="S",
+            unit=_TIME,
             panel=_FILE,
             text="The rows are evenly sampled, so far apart; a time column then tells only which were lost.",
         ),
@@ -152,7 +154,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         float | None,
         _number(
             "--from",
-            unit="S",
+            unit=_TIME,
             panel=_FIGURES,
             text="Judge what is later than this, and so after every restart. Default 0.3; of a run 0.",
         ),

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dcmp_hil.cli.options import Force, JsonFile, Overrides, RigName
+from dcmp_hil.cli.options import Force, JsonFile, Overrides, RigName, duration_of
 from dcmp_hil.common.printable_text import readable
 
 
@@ -26,9 +26,20 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     rig: RigName = "bench-1khz",
     overrides: Overrides = None,
     duration: Annotated[
-        float | None, typer.Option("--duration", metavar="S", help="Length, s; 0 = until Ctrl-C.")
+        float | None,
+        typer.Option(
+            "--duration",
+            metavar="TIME",
+            parser=duration_of("--duration"),
+            help="Length, such as 10s or 2min; 0 = until Ctrl-C.",
+        ),
     ] = None,
-    window_from: Annotated[float, typer.Option("--from", metavar="S", help="Start of the figures, s.")] = 0.0,
+    window_from: Annotated[
+        float,
+        typer.Option(
+            "--from", metavar="TIME", parser=duration_of("--from"), help="Start of the figures, such as 5s."
+        ),
+    ] = 0.0,
     fast: Annotated[
         bool, typer.Option("--fast", help="Virtual time: as fast as it computes (simulated rig).")
     ] = False,

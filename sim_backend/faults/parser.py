@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from dcmp_hil.common.durations import EXAMPLES, seconds
 from dcmp_hil.common.number_range import NumberRange
 from dcmp_hil.common.similar_names import did_you_mean
 from sim_backend.faults.fault_model import Number
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
     from sim_backend.faults.fault_model import Choice, Kind, Value
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
-_SECONDS_PER_UNIT = {"s": 1.0, "ms": 1e-3, "": 1.0}
 _PERCENT_RATIO = 0.01
 _START_TIME_S = NumberRange(0.0, 1e6)
 
@@ -73,12 +74,11 @@ def _value(key: str, text: str, kind: Kind) -> Value:
 def _time(key: str, text: str) -> Value:
     if key == "at" and text == "boot":
         return text
-    found = _NUMBER.fullmatch(text)
-    if found and found[2] in _SECONDS_PER_UNIT:
-        value = float(found[1]) * _SECONDS_PER_UNIT[found[2]]
+    with suppress(ValueError):
+        value = seconds(text)
         if _START_TIME_S.holds(value):
             return value
-    words = 'a time such as 3s or 200ms, or "boot"' if key == "at" else "a time such as 3s or 200ms"
+    words = f'{EXAMPLES}, or "boot"' if key == "at" else EXAMPLES
     raise ValueError(f'{key}: got "{text}"; expected {words}.')
 
 

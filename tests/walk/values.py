@@ -37,8 +37,8 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
     "run": {
         "RIG": (OUT, ("{rig}",)),
         "--set": given("--set", "reference.amplitude_rad=0.7"),
-        "--duration": (("--duration", "1.2"),),
-        "--from": given("--from", "0.3"),
+        "--duration": (("--duration", "1200ms"),),
+        "--from": given("--from", "300ms"),
         "--record": given("--record", "{folder}/other.rrd"),
         "--json": given("--json", "{folder}/figures.json", "-"),
         "--note": given("--note", "µ → ≤"),
@@ -66,7 +66,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
         "--M": given("--M", "4000"),
         "--L1": given("--L1", "400"),
         "--L2": given("--L2", "30000"),
-        "--from": given("--from", "0.3"),
+        "--from": given("--from", "300ms"),
         "--cutoff": given("--cutoff", "15"),
         "--json": given("--json", "{folder}/figures.json", "-"),
         "--csv": given("--csv", "{folder}/again.csv"),
@@ -94,7 +94,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
     "monitor": {
         "RIG": (("bench-serial",),),
         "--set": (("--set", "backend.port={device}"),),
-        "--duration": (("--duration", "0.3"),),
+        "--duration": (("--duration", "0.3s"),),
     },
     "conform": {
         "PORT": (("{device}",),),
