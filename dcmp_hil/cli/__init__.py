@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
 import typer
+from typer.exceptions import TyperException
 
 from dcmp_hil import __version__
 from dcmp_hil.cli import console, streams
@@ -15,6 +16,7 @@ from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
 from dcmp_hil.cli.forced_exit import leave
+from dcmp_hil.cli.help_texts import HELP, epilog, paragraphs
 from dcmp_hil.cli.live_commands import set_keys, status, stop, tell_stopped
 from dcmp_hil.cli.monitor import monitor
 from dcmp_hil.cli.panel import panel
@@ -23,8 +25,9 @@ from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
+from dcmp_hil.cli.usage import Commands, sentence
 from dcmp_hil.cli.view import view
-from dcmp_hil.errors import DcmpError
+from dcmp_hil.errors import ConfigError, DcmpError, ExitCode
 from dcmp_hil.platform.host_info import require_linux
 
 if TYPE_CHECKING:
@@ -32,9 +35,13 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 
+_PROGRAM = "dcmp-hil"  # also for `python -m dcmp_hil`
+
 app = typer.Typer(
+    cls=Commands,
     help="Run a DC-motor pendulum: observer, controller, amplifier, live picture.",
-    no_args_is_help=True,
+    epilog="`dcmp-hil COMMAND --help` has examples. Begin with `dcmp-hil run`.",
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -71,10 +78,15 @@ ON_LINUX: dict[str, Callable[..., None]] = {
     "status": status,
     "panel": panel,
 }
-for name, command in EVERYWHERE.items():
-    app.command(name)(command)
-for name, command in ON_LINUX.items():
-    app.command(name)(_on_linux(name, command))
+for name, texts in HELP.items():
+    everywhere = EVERYWHERE.get(name)
+    app.command(
+        name,
+        rich_help_panel=texts.group,
+        short_help=texts.summary,
+        help=paragraphs(everywhere or ON_LINUX[name]),
+        epilog=epilog(texts.examples),
+    )(everywhere or _on_linux(name, ON_LINUX[name]))
 
 
 def _version(value: bool) -> None:
@@ -85,11 +97,15 @@ def _version(value: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[
+    context: typer.Context,
+    _: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Run a DC-motor pendulum: observer, controller, amplifier, live picture."""
+    if context.invoked_subcommand is None:
+        context.get_help()
+        raise typer.Exit(ExitCode.CONFIG)
 
 
 def main(stopped: Any = None) -> None:
@@ -112,7 +128,13 @@ def _call(stopped: Any) -> None:
     try:
         if stopped is not None:
             tell_stopped(stopped)
-        app()
+        code = app(prog_name=_PROGRAM, standalone_mode=False)
     except DcmpError as error:
         console.complain(error)
         sys.exit(error.exit_code)
+    except TyperException as error:
+        console.complain(ConfigError(sentence(error)))
+        sys.exit(error.exit_code)
+    except typer.Abort:  # standard input ended at a question
+        sys.exit(ExitCode.FAILED)
+    sys.exit(code if isinstance(code, int) else ExitCode.OK)

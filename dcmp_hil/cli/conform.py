@@ -69,7 +69,7 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     bitrate: Annotated[
         int, typer.Option(metavar="BIT_S", min=10_000, max=1_000_000, help="Of a CAN bus.")
     ] = 1_000_000,
-    node: Annotated[int, typer.Option(min=0, max=15, help="Number of the device on a shared bus.")] = 0,
+    node: Annotated[int, typer.Option(metavar="N", min=0, max=15, help="Of the device on a shared bus.")] = 0,
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="CHECK", help="Run only this check. Repeatable.")
     ] = None,

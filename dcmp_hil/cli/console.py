@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
@@ -36,20 +40,68 @@ out = SafeConsole(soft_wrap=True)
 err = SafeConsole(stderr=True, soft_wrap=True)
 
 
+def take_width(console: Console) -> None:
+    """Let a console know the width of the terminal that it prints on, which a user may change at any time.
+
+    The console itself measures the standard streams of its process, which are no terminal in telemetry.
+    """
+    with suppress(OSError, ValueError):  # no file descriptor, or no terminal
+        columns = os.get_terminal_size(console.file.fileno()).columns
+        if columns:
+            console.width = columns
+
+
+def print_sentence(console: Console, text: Text) -> None:
+    """Print one line; on a terminal it is broken between words, and a word that is too long is left whole."""
+    if console.is_terminal:
+        take_width(console)
+        lines = text.divide(_breaks(text.plain, console.width))
+        for line in lines:
+            line.rstrip()
+        text = Text("\n").join(lines)
+    console.print(text, soft_wrap=True)
+
+
+def _breaks(text: str, columns: int) -> list[int]:
+    """Return where the second and every later line begins."""
+    breaks, used = [], 0
+    for word in re.finditer(r"\s*\S+\s*", text):
+        if used and used + cell_len(word[0].rstrip()) > columns:
+            breaks.append(word.start())
+            used = 0
+        used += cell_len(word[0])
+    return breaks
+
+
 def complain(error: DcmpError) -> None:
     """Print an error to standard error, a line for each of its faults and notes."""
     for line in (*str(error).splitlines(), *getattr(error, "__notes__", ())):
-        err.print(Text.assemble(("error: ", "bold red"), line))
+        print_sentence(err, Text.assemble(("error: ", "bold red"), line))
 
 
 def warn(sentence: str) -> None:
     """Print a warning."""
-    err.print(Text.assemble(("warning: ", "bold yellow"), sentence))
+    print_sentence(err, Text.assemble(("warning: ", "bold yellow"), sentence))
 
 
-def note(sentence: str) -> None:
-    """Print something worth knowing."""
-    err.print(Text(sentence, style="dim"))
+def note(sentence: str, command: str = "") -> None:
+    """Print something worth knowing.
+
+    Parameters
+    ----------
+    sentence
+        The words.
+    command
+        A command line that follows; on a narrow terminal it has a line of its own, to be copied whole.
+    """
+    whole = f"{sentence} {command}".strip()
+    take_width(err)
+    if command and err.is_terminal and cell_len(whole) > err.width:
+        if sentence:
+            print_sentence(err, Text(sentence, style="dim"))
+        err.print(Text(command, style="dim"), soft_wrap=True)
+    else:
+        print_sentence(err, Text(whole, style="dim"))
 
 
 def as_json(figures: Any) -> str:

@@ -65,7 +65,7 @@ def device(
         console.out.print(port, highlight=False, markup=False)
         path = port if "/" in port else f"./{port}"  # without a slash it would be a serial number
         keys = [key.format(port=path) for key in _RUN_WITH[link]]
-        console.note(shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
+        console.note("", shlex.join(_run_command(rig, [*(overrides or ()), *keys])))
         _keep_running(running, loaded, stop)
     raise typer.Exit(stop.exit_code)
 

@@ -6,7 +6,6 @@ import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.errors import DcmpError, ExitCode
@@ -21,7 +20,7 @@ Run = Annotated[
 
 def set_keys(
     changes: Annotated[
-        list[str], typer.Argument(metavar="KEY=VALUE...", help="Such as controller.kp_1_s2=5200.")
+        list[str], typer.Argument(metavar="KEY=VALUE", help="Such as controller.kp_1_s2=5200.")
     ],
     run: Run = None,
 ) -> None:
@@ -56,7 +55,7 @@ def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
     if end is End.CONFIRMED:
         console.out.print(sentence, highlight=False, markup=False)
     else:
-        console.err.print(Text.assemble(("error: ", "bold red"), sentence))
+        console.complain(DcmpError(sentence))
     codes = {
         End.CONFIRMED: ExitCode.OK,
         End.UNCONFIRMED: ExitCode.BACKEND,

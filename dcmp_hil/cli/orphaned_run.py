@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.run_sinks import use_terminal
+from dcmp_hil.errors import DcmpError
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -67,7 +68,7 @@ class Unattended:
         )
         document = run_document(self.rig, self.note, self.faults, result, ended_by)
         use_terminal()
-        console.err.print(f"error: {sentence}", highlight=False, markup=False)
+        console.complain(DcmpError(sentence))
         if self.folder is not None and not (self.folder / "summary.json").exists():
             figures_and_rig = {**document, "rig_toml": self.rig.model_dump(mode="json")}
             write_text(self.folder / "summary.json", console.as_json(figures_and_rig))

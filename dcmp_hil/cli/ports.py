@@ -18,7 +18,7 @@ _WAIT_RANGE_S = NumberRange(0.1, 60.0)
 def ports(
     port: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PORT]...", help="Additional serial ports, such as /dev/pts/3."),
+        typer.Argument(metavar="PORT", help="Additional serial ports, such as /dev/pts/3."),
     ] = None,
     baud: Annotated[
         int, typer.Option(metavar="BIT_S", min=9600, max=12_000_000, help="Of serial ports.")

@@ -46,8 +46,9 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     viewer: Annotated[
         Viewer | None,
         typer.Option(
-            help="A window, a page in a browser, a server for viewers that come and go (dcmp-hil view), the "
-            "viewer that runs already, or none. By default a window if there is a display."
+            metavar="HOW",
+            help="spawn: a window. web: a page in a browser. serve: for viewers that come and go (dcmp-hil "
+            "view). connect: the viewer that runs already. none. By default a window if there is a display.",
         ),
     ] = None,
     record: Annotated[
@@ -61,7 +62,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         list[str] | None,
         typer.Option(
             "--fault",
-            metavar="KIND[:KEY=VALUE,...]",
+            metavar="KIND:...",
             help="Inject a fault, such as wire.drop:p=0.2,at=3s,for=1s (simulated rig). Repeatable.",
         ),
     ] = None,

@@ -103,7 +103,7 @@ class RunFolder:
         console.note(f"kept in {self.path}/")
         recording = record or self.recording
         if not live and recording.exists():
-            console.note(f"no viewer was open; to see the run: {_viewer_command()} {recording}")
+            console.note("no viewer was open; to see the run:", f"{_viewer_command()} {recording}")
         picture = self.path / "run.png"
         if picture.exists():
             console.note(f"or look at {picture}")

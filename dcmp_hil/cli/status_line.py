@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.cells import cell_len
 from rich.live import Live
 from rich.text import Text
 
+from dcmp_hil.cli.console import print_sentence, take_width
 from dcmp_hil.telemetry.statistics import Durations
 from dcmp_hil.values import PhaseData
 
@@ -98,7 +97,7 @@ class StatusLine:
         if self._live is None:
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
             self._live.start()
-        self._take_width()
+        take_width(self._console)
         line = fitted(self._fields(block), self._console.width)
         self._live.update(Text(line, no_wrap=True, overflow="crop"), refresh=True)
 
@@ -107,22 +106,12 @@ class StatusLine:
         if isinstance(event.data, PhaseData):
             self._phase = event.data.phase
         elif event.level == "WARN":
-            self._console.print(Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING_STYLE))
+            print_sentence(self._console, Text(f"{event.t:8.3f} s  {event.text}", style=_WARNING_STYLE))
 
     def close(self) -> None:
         """Remove the status line; the summary follows."""
         if self._live is not None:
             self._live.stop()
-
-    def _take_width(self) -> None:
-        """Take the width of the terminal that is printed on, which a user may change at any time.
-
-        The console itself measures its process's standard streams, which are no terminal in telemetry.
-        """
-        with suppress(OSError, ValueError):  # no file descriptor, or no terminal
-            columns = os.get_terminal_size(self._console.file.fileno()).columns
-            if columns:
-                self._console.width = columns
 
     def _fields(self, block: Block) -> tuple[Field, ...]:
         lateness = self._lateness.percentiles()

@@ -81,7 +81,7 @@ def web_viewer(port: int) -> Iterator[None]:
     """Serve the web viewer of what is served on `port`, and tell its address; a failure is a warning."""
     with pages(port) as address:
         if address:
-            console.note(f"web viewer: {address}")
+            console.note("web viewer:", address)
             open_browser(address)
         yield
 
