@@ -61,6 +61,7 @@ class Options:
     control: bool = True
     clear: bool = False
     force: bool = False
+    source: str = ""  # the rig's file or name
 
 
 def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
@@ -81,7 +82,13 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     faults = inject(rig, options.faults, "--fault")
     # From here on stops are heard: opening a viewer takes its time, too.
     with StopRequest() as stop:
-        return _run(rig, faults, replace(options, viewer=chosen(options.viewer)), stop)
+        source = str(Path(rig_name).absolute()) if _is_file(rig_name) else rig_name
+        return _run(rig, faults, replace(options, viewer=chosen(options.viewer), source=source), stop)
+
+
+def _is_file(rig_name: str) -> bool:
+    """Return whether a rig is meant as a file, by the rule of `load_rig`."""
+    return rig_name.endswith(".toml") or "/" in rig_name
 
 
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
@@ -162,7 +169,7 @@ def _control(rig: Rig, options: Options, folder: RunFolder | None) -> CommandPro
 
     place = folder.path.absolute() if folder else None
     unattended = Unattended(rig, place, options.json_file, options.note, options.faults)
-    return CommandProcess(listen=options.control, unattended=unattended)
+    return CommandProcess(listen=options.control, unattended=unattended, source=options.source)
 
 
 def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMaker]:

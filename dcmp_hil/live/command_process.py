@@ -37,6 +37,8 @@ class CommandProcess:
         Whether others may change the run.
     unattended
         Called in the telemetry process where this process has ended by force; see `CommandInterface`.
+    source
+        The rig's file, or the name of a shipped rig; for clients that write values into it.
 
     Attributes
     ----------
@@ -47,9 +49,13 @@ class CommandProcess:
     """
 
     def __init__(
-        self, *, listen: bool = True, unattended: Callable[[SummarySink, int, str, str], None] | None = None
+        self,
+        *,
+        listen: bool = True,
+        unattended: Callable[[SummarySink, int, str, str], None] | None = None,
+        source: str = "",
     ) -> None:
-        self._listen, self.unattended = listen, unattended
+        self._listen, self.unattended, self._source = listen, unattended, source
         self._file = reserve(self, "mailbox")
         self.mailbox = Mailbox(mapped(self._file, MAILBOX_BYTES))
         self.pid: int | None = None
@@ -76,7 +82,7 @@ class CommandProcess:
         try:
             child = ChildProcess(
                 _SERVER_MODULE,
-                CommandSetup(rig, self._file, ring, self._listen),
+                CommandSetup(rig, self._file, ring, self._listen, self._source),
                 shared=[self._file, ring],
                 blocked=SIGNALS,  # until it has handlers of its own
             )

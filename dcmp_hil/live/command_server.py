@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -20,9 +21,11 @@ from dcmp_hil.ipc.ring import Ring, capacity_of
 from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.live.connection_limits import REQUEST_INTERVAL_MIN_S, REQUEST_TIMEOUT_S, ConnectionPool, listen
+from dcmp_hil.live.envelopes import BUCKETS_PER_LINE_MAX, COLUMNS, Envelopes
 from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.run_watch import RunWatch
-from dcmp_hil.live.state import state_of
+from dcmp_hil.live.start_values import overrides_between, tunable_overrides
+from dcmp_hil.live.state import phase_name, state_of
 from dcmp_hil.live.stop_command import stop_run
 from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed, doubts
@@ -42,6 +45,7 @@ _CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change
 _POLL_PERIOD_S = 0.002  # s
 _STATE_PERIOD_S = 0.1  # s between two states that are sent to every watcher
 _CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest cycle
+_MARKS_MAX = 8  # changes that a state names
 _STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in, after the end
 
 
@@ -57,12 +61,15 @@ class CommandSetup:
         Descriptors of their memory.
     listen
         Whether others may change the run; STOP by a signal is seen to in any case.
+    source
+        The rig's file, an absolute path, or the name of a shipped rig; empty if it has neither.
     """
 
     rig: Rig
     mailbox: int
     ring: int
     listen: bool = True
+    source: str = ""
 
 
 class Server:
@@ -79,7 +86,9 @@ class Server:
     """
 
     def __init__(self, setup: CommandSetup, mailbox: Mailbox, parent: int) -> None:
-        self._rig, self._tunables = setup.rig, tunable_descriptions(setup.rig)
+        self._rig = self._started_with = setup.rig
+        self._source = setup.source
+        self._tunables = self._described()
         self._parent = parent
         self._mailbox = mailbox
         size = os.fstat(setup.ring).st_size
@@ -89,7 +98,9 @@ class Server:
         self._written, self._newest_ns = 0, self._clock.now_ns()
         self._stopping: asyncio.Task[Stopped] | None = None
         self._unanswered = 0  # who asked for STOP and has no answer yet
-        self._watchers: set[asyncio.StreamWriter] = set()
+        self._watchers: dict[asyncio.StreamWriter, int] = {}  # and the next bucket of each
+        self._envelopes = Envelopes(setup.rig)
+        self._marks: deque[tuple[float, str]] = deque(maxlen=_MARKS_MAX)
         self._over = False  # the last words are sent
         self._connections = ConnectionPool()
 
@@ -112,13 +123,13 @@ class Server:
             pass
         finally:
             self._connections.forget(writer)
-            self._watchers.discard(writer)
+            self._watchers.pop(writer, None)
             writer.close()
 
     async def _answer(self, request: Any, writer: asyncio.StreamWriter) -> None:
         do = request.get("do") if isinstance(request, dict) else None
         if do == "watch":
-            self._watchers.add(writer)
+            self._watchers[writer] = 0
             await self._watch(writer)
         elif do == "stop":
             self._connections.forget(writer)  # it stays until it is answered
@@ -131,21 +142,33 @@ class Server:
 
     async def _watch(self, writer: asyncio.StreamWriter) -> None:
         while not self._over:  # behind the last words there is no state any more
-            await _send(writer, self.state())
-            await asyncio.sleep(_STATE_PERIOD_S)
+            self._watchers[writer], buckets = self._envelopes.history.after(self._watchers[writer])
+            await _send(writer, {**self.state(), "columns": COLUMNS, "buckets": buckets})
+            if len(buckets) < BUCKETS_PER_LINE_MAX:  # else more of what has been waits
+                await asyncio.sleep(_STATE_PERIOD_S)
 
     def state(self) -> dict[str, Any]:
         """Return where the run stands, and how old that is."""
         age = 1e-9 * (self._clock.now_ns() - self._newest_ns)
         state = state_of(self._ring.latest(), self._mailbox.phase, self._rig, age)
-        state |= {"pid": self._parent, "stopping": self._stopping is not None, "knobs": self._tunables}
-        return state
+        state |= {"pid": self._parent, "stopping": self._stopping is not None, **self._tunables}
+        state |= {"late": self._envelopes.late, "missed": self._ring.dropped}
+        return state | {"marks": list(self._marks), "source": self._source}
+
+    def _described(self) -> dict[str, Any]:
+        """Return what can be changed, as it is, and the changes that lead back to the start."""
+        return {
+            "knobs": tunable_descriptions(self._rig),
+            "back": overrides_between(self._rig, self._started_with),
+            "values": tunable_overrides(self._rig),
+        }
 
     def look(self) -> bool:
-        """Note how old the newest cycle is; return whether the run's process is there."""
+        """Take in the newest cycles, and note their age; return whether the run's process is there."""
         written = self._ring.written
         if written != self._written:
             self._written, self._newest_ns = written, self._clock.now_ns()
+            self._envelopes.add(self._ring.drain())
         return parent_lives(self._parent)
 
     def stop(self, by: int = STOP_REQUEST) -> asyncio.Task[Stopped]:
@@ -188,7 +211,9 @@ class Server:
             why = "the arm is being lowered" if answer.what == LOWERING else "its events say why"
             return {"ok": False, "said": f"The run did not take it: {why}."}
         doubtful = doubts(self._rig, rig)
-        self._rig, self._tunables = rig, tunable_descriptions(rig)
+        self._rig = rig
+        self._tunables = self._described()
+        self._marks.append((answer.t, change.words))
         said = [f"{change.words}, applied at {answer.t:.3f} s", *(f"warning: {one}" for one in doubtful)]
         return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
 
@@ -211,10 +236,14 @@ class Server:
             await asyncio.sleep(_POLL_PERIOD_S)
         self._over = True
         said = self._mailbox.last_words or "it died; the device goes to 0 V by itself."
-        ended = {"ended": said, "at_zero": self._mailbox.end == AT_ZERO}
-        for writer in tuple(self._watchers):
+        self._envelopes.add(self._ring.drain())
+        self._envelopes.finish()
+        ended = {"ended": said, "at_zero": self._mailbox.end == AT_ZERO, "late": self._envelopes.late}
+        ended["last_phase"] = phase_name(self._mailbox.phase)
+        for writer, place in tuple(self._watchers.items()):
+            last = {**ended, "columns": COLUMNS, "buckets": self._envelopes.history.newest(place)}
             with suppress(OSError):
-                await asyncio.wait_for(_send(writer, ended), 0.2)
+                await asyncio.wait_for(_send(writer, last), 0.2)
 
 
 async def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> None:

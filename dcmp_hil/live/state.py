@@ -37,18 +37,40 @@ def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -
         "rig": rig.name,
         "t_s": row.get("t"),
         "age_s": age,
-        "phase": "silent" if silent else _PHASE_NAMES[phase] if 0 <= phase < len(_PHASE_NAMES) else "unknown",
+        "phase": "silent" if silent else phase_name(phase),
         "position_rad": row.get("position"),
         "velocity_rad_s": row.get("velocity_estimate"),
         "reference_rad": row.get("position_reference"),
         "voltage_V": row.get("voltage_applied"),
         "voltage_limit_V": rig.amplifier.limit,
-        "disturbance_rad_s2": row.get("disturbance_estimate"),
+        **_disturbance(row, rig),
         "error_mrad": _error_mrad(row),
         "lateness_us": 1e6 * row.get("lateness", math.nan),
         "fault": _fault(int(row.get("fault", 0.0))),
     }
     return {key: _plain(value) for key, value in state.items()}
+
+
+def phase_name(number: int) -> str:
+    """Return the phase at a place in the list of phases."""
+    return _PHASE_NAMES[number] if 0 <= number < len(_PHASE_NAMES) else "unknown"
+
+
+def _disturbance(row: Mapping[str, float], rig: Rig) -> dict[str, float | None]:
+    """Return the estimate of the disturbance and what the model explains of it, rad/s2; see `Block`."""
+    whole = row.get("disturbance_estimate")
+    gravity = friction = rest = None
+    if whole is not None:
+        model, velocity = rig.model.values(), row["velocity_estimate"]
+        gravity = -model.gravity * math.sin(row["position_estimate"])
+        friction = -math.copysign(model.f1, velocity) if velocity else 0.0
+        rest = whole - gravity - friction
+    return {
+        "disturbance_rad_s2": whole,
+        "gravity_rad_s2": gravity,
+        "friction_rad_s2": friction,
+        "rest_rad_s2": rest,
+    }
 
 
 def _error_mrad(row: Mapping[str, float]) -> float | None:
