@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders walk numbers chatter stop-bars lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders walk numbers panel-hour chatter stop-bars lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -87,6 +87,9 @@ numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulat
 
 walk: $(DEV) ## every command in every combination of its options and outputs; CI asks every pair of options and every output
 	@DCMP_WALK=all $(BIN)/python -m pytest tests/walk $(ARGS)
+
+panel-hour: $(DEV) ## push an hour of states into the panel's page in a browser: its memory stays flat
+	@DCMP_PANEL_S=3600 $(BIN)/python -m pytest -n 0 -q -k memory tests/panel/test_page.py $(ARGS)
 
 chatter: $(DEV) ## 1,000 healthy arms and the hard cases: how near their voltage comes to being called chatter
 	@$(BIN)/python -m tools.chatter $(ARGS)

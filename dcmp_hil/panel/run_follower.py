@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.live.envelopes import BucketHistory
 from dcmp_hil.live.run_sockets import running, socket_of
 
 _SEARCH_PERIOD_S = 0.5  # s between two looks for a run
@@ -26,7 +27,9 @@ class Watcher:
     Attributes
     ----------
     state
-        What the page is shown.
+        What the page is shown. Of a run that has ended it keeps the rest of its last state.
+    history
+        The last seconds of the run, also after its end.
     run
         Process id of the run that is watched; None while there is none.
     """
@@ -35,6 +38,7 @@ class Watcher:
         self._wanted = pid
         self.run: int | None = None
         self.state: dict[str, Any] = {"connection": "none"}
+        self.history = BucketHistory()
 
     async def watch(self) -> None:
         """Follow one run after the other, until cancelled."""
@@ -45,7 +49,7 @@ class Watcher:
                     await self._follow(pid)
                 self.run = None
                 if self.state["connection"] != "ended":
-                    self.state = {"connection": "ended", "ended": "its command process is gone."}
+                    self.state |= {"connection": "ended", "ended": "its command process is gone."}
             await asyncio.sleep(_SEARCH_PERIOD_S)
 
     def _find(self) -> int | None:
@@ -60,13 +64,22 @@ class Watcher:
     async def _follow(self, pid: int) -> None:
         reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE_BYTES_MAX)
         self.run = pid
+        self.history.clear()
+        self.state = {"connection": "live"}
         try:
             writer.write(b'{"do": "watch"}\n')
             while line := await self._next_line(reader):
-                state = json.loads(line)
-                self.state = {"connection": "ended" if "ended" in state else "live", **state}
+                self._take(json.loads(line))
         finally:
             writer.close()
+
+    def _take(self, state: dict[str, Any]) -> None:
+        """Keep a state; the last words of a run are added to the state before."""
+        self.history.add(state.pop("buckets", []))
+        if "ended" in state:
+            self.state = {**self.state, **state, "connection": "ended"}
+        else:
+            self.state = {**state, "connection": "live"}
 
     async def _next_line(self, reader: asyncio.StreamReader) -> bytes:
         """Return the next line; while none comes, the page is told."""

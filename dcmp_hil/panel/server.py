@@ -17,23 +17,33 @@ from aiohttp import web
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.client import change, stop
+from dcmp_hil.live.envelopes import BUCKETS_PER_LINE_MAX
 from dcmp_hil.live.stop_command import End
 from dcmp_hil.panel.access_control import AccessControl
 from dcmp_hil.panel.admission import BACKLOG_MAX, ConnectionLimiter, Visit
 from dcmp_hil.panel.log_filter import quiet
 from dcmp_hil.panel.request_head import BODY_BYTES_MAX
+from dcmp_hil.panel.rig_file import RigFiles
 from dcmp_hil.panel.run_follower import Watcher
 from dcmp_hil.platform.clock import MonotonicClock
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-_PAGE = resources.files("dcmp_hil.panel").joinpath("page")
-_FILES = {"/": "text/html", "/panel.css": "text/css", "/panel.js": "text/javascript"}
+_MODULES = ("asking", "knobs", "marks", "panel", "phase", "plots", "rig_file", "stop", "tiles", "trace")
 _STATE_PERIOD_S = 0.15  # s between two states that a page is sent
 _ACCEPT_QUEUE_MAX = 1024  # connections that the kernel keeps while this process is busy
 _STOP_AGE_MAX_S = 1.0  # s: a STOP that is older was pressed for something that has passed, or for another run
 _NO_RUN = "There is no run."
+_OWN = resources.files("dcmp_hil.panel").joinpath("page")
+_UPLOT = resources.files("dcmp_hil").joinpath("vendor", "uplot")
+_FILES = {
+    "/": (_OWN.joinpath("index.html"), "text/html"),
+    "/panel.css": (_OWN.joinpath("panel.css"), "text/css"),
+    **{f"/{name}.js": (_OWN.joinpath(f"{name}.js"), "text/javascript") for name in _MODULES},
+    "/uplot.css": (_UPLOT.joinpath("uPlot.min.css"), "text/css"),
+    "/uplot.js": (_UPLOT.joinpath("uPlot.iife.min.js"), "text/javascript"),
+}
 
 
 class Panel:
@@ -53,6 +63,7 @@ class Panel:
         self.access = AccessControl(port, viewer)
         self._port, self._viewer = port, viewer
         self._watcher = Watcher(pid)
+        self._rig_files = RigFiles()
         self._stopping = ThreadPoolExecutor(2)  # STOP queues behind nothing
         self._stop_of: dict[
             int, asyncio.Task[str]
@@ -73,6 +84,7 @@ class Panel:
         app.add_routes([web.get(path, self._file) for path in _FILES])
         app.add_routes([web.get("/events", self._events)])
         app.add_routes([web.post("/set", self._set), web.post("/stop", self._stop)])
+        app.add_routes([web.post("/rig-diff", self._rig_diff), web.post("/rig-write", self._rig_write)])
         return app
 
     async def serve(self, ready: Callable[[str], None]) -> None:
@@ -116,20 +128,23 @@ class Panel:
         self._ending.set()
 
     async def _file(self, request: web.Request) -> web.Response:
-        name = request.path.removeprefix("/") or "index.html"
-        text = _PAGE.joinpath(name).read_text("utf-8")
-        if name == "index.html":
+        file, kind = _FILES[request.path]
+        text = file.read_text("utf-8")
+        if request.path == "/":
             text = text.replace("{{viewer}}", escape(self._viewer))
-        return web.Response(text=text, content_type=_FILES[request.path])
+        return web.Response(text=text, content_type=kind)
 
     async def _events(self, request: web.Request) -> web.StreamResponse:
         answer = web.StreamResponse(headers={"Content-Type": "text/event-stream"})
         await answer.prepare(request)
+        place = 0
         try:
             while not self._ending.is_set():
-                state = {**self._watcher.state, "server_ms": _now_ms()}
+                place, buckets = self._watcher.history.after(place)
+                state = {**self._watcher.state, "buckets": buckets, "server_ms": _now_ms()}
                 await answer.write(f"data: {json.dumps(state)}\n\n".encode())
-                await asyncio.sleep(_STATE_PERIOD_S)
+                if len(buckets) < BUCKETS_PER_LINE_MAX:
+                    await asyncio.sleep(_STATE_PERIOD_S)
         except ConnectionError:  # the page was closed
             pass
         return answer
@@ -143,6 +158,28 @@ class Panel:
             return _said(ok=False, said=_NO_RUN)
         try:
             return _said(ok=True, said=await asyncio.to_thread(change, run, changes))
+        except ConfigError as error:
+            return _said(ok=False, said=str(error))
+
+    async def _rig_diff(self, _: web.Request) -> web.Response:
+        """Answer with what would put the values of the run, or of the last one, into its rig file."""
+        state = self._watcher.state
+        source, values = state.get("source"), state.get("values")
+        if not source or values is None:
+            return _said(ok=False, said="There is no run whose rig has a name or a file.")
+        try:
+            found = await asyncio.to_thread(self._rig_files.propose, source, values)
+        except ConfigError as error:
+            return _said(ok=False, said=str(error))
+        return web.json_response({"ok": True, "said": "", "source": source, **found})
+
+    async def _rig_write(self, request: web.Request) -> web.Response:
+        body = await _json(request)
+        number = body.get("proposal") if isinstance(body, dict) else None
+        if not isinstance(number, str):
+            return _said(ok=False, said="What is accepted is named by its number.", status=400)
+        try:
+            return _said(ok=True, said=f"wrote {await asyncio.to_thread(self._rig_files.accept, number)}")
         except ConfigError as error:
             return _said(ok=False, said=str(error))
 

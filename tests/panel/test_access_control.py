@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import http.client
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
+from dcmp_hil import panel
 from tests.live.processes import TIMEOUT_S, own_folder, started
 from tests.panel.test_browser import address_of, free_port
 
@@ -44,8 +46,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[_Page]:
     port = free_port()
     with pytest.MonkeyPatch.context() as patch, own_folder(patch):
         arguments = ("panel", "--port", str(port), "--viewer", 'http://127.0.0.1:9090/x?a="b')
-        with started(tmp_path_factory.mktemp("panel"), *arguments) as panel:
-            yield _Page(port, address_of(panel).partition("token=")[2])
+        with started(tmp_path_factory.mktemp("panel"), *arguments) as process:
+            yield _Page(port, address_of(process).partition("token=")[2])
 
 
 def test_token_is_exchanged_for_a_cookie_that_no_other_site_is_sent(page: _Page) -> None:
@@ -61,7 +63,8 @@ def test_token_is_exchanged_for_a_cookie_that_no_other_site_is_sent(page: _Page)
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/events", "/panel.js", "/panel.css", "/nothing", "/?token=wrong", "/?token=%ff"]
+    "path",
+    ["/", "/events", "/panel.js", "/uplot.js", "/panel.css", "/nothing", "/?token=wrong", "/?token=%ff"],
 )
 def test_no_request_gets_in_without_the_token(page: _Page, path: str) -> None:
     for cookie in ("", "other=1", f"dcmp_hil_{page.port}=wrong"):
@@ -71,13 +74,15 @@ def test_no_request_gets_in_without_the_token(page: _Page, path: str) -> None:
         assert "default-src 'none'" in headers["Content-Security-Policy"]
 
 
-@pytest.mark.parametrize("path", ["/set", "/stop"])
-def test_another_page_can_neither_change_nor_stop(page: _Page, path: str) -> None:
+@pytest.mark.parametrize("path", ["/set", "/stop", "/rig-diff", "/rig-write"])
+def test_another_page_can_neither_change_nor_stop_nor_write(page: _Page, path: str) -> None:
     for origin in ({}, {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": "http://127.0.0.1"}):
         status, _, _ = page.ask("POST", path, '{"changes": []}', Cookie=page.cookie, **origin)
         assert status == 403, origin
-    status, text, _ = page.ask("POST", path, '{"changes": []}', Cookie=page.cookie, Origin=page.origin)
-    assert (status, "There is no run." in text) == (200, True)
+    body = '{"changes": [], "proposal": "x"}'
+    status, text, _ = page.ask("POST", path, body, Cookie=page.cookie, Origin=page.origin)
+    expected = {"/rig-diff": "no run whose rig", "/rig-write": "no longer known"}
+    assert (status, expected.get(path, "There is no run.") in text) == (200, True)
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "evil.example:80", "127.0.0.1:1"])
@@ -90,6 +95,23 @@ def test_another_name_for_this_machine_is_refused(page: _Page, host: str) -> Non
 def test_what_is_no_change_is_refused(page: _Page, body: str) -> None:
     status, text, _ = page.ask("POST", "/set", body, Cookie=page.cookie, Origin=page.origin)
     assert (status, "KEY=VALUE" in text) == (400, True)
+
+
+@pytest.mark.parametrize("body", ["", "[]", '{"proposal": 1}', "{}"])
+def test_what_accepts_no_diff_is_refused(page: _Page, body: str) -> None:
+    status, _, _ = page.ask("POST", "/rig-write", body, Cookie=page.cookie, Origin=page.origin)
+    assert status == 400
+
+
+def test_every_file_of_the_page_is_served(page: _Page) -> None:
+    folder = Path(panel.__file__).parent / "page"
+    for file in folder.iterdir():
+        path = "/" if file.name == "index.html" else f"/{file.name}"
+        status, text, headers = page.ask("GET", path, Cookie=page.cookie)
+        assert (status, len(text) > 100) == (200, True), file.name
+        assert headers["Content-Type"].startswith(("text/javascript", "text/css", "text/html"))
+    for path in ("/uplot.js", "/uplot.css"):
+        assert page.ask("GET", path, Cookie=page.cookie)[0] == 200
 
 
 def test_port_in_use_is_said(page: _Page, tmp_path_factory: pytest.TempPathFactory) -> None:

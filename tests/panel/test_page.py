@@ -1,0 +1,268 @@
+"""The page at every size: STOP within reach, nothing clipped, plots that are read, history, diff, memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dcmp_hil.config import copy_rig, load_rig
+from dcmp_hil.live.client import change, status
+from dcmp_hil.live.envelopes import COLUMNS
+from dcmp_hil.live.tunables import value_of
+from tests.live.processes import TIMEOUT_S, own_folder, started, until, until_running
+from tests.panel.browser import browser, needed
+from tests.panel.test_browser import address_of, free_port
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from selenium.webdriver import Chrome
+
+_SIZES = [(1366, 768), (1600, 900), (1920, 1080), (412, 915), (915, 412)]
+_PHONE_PX = 915  # longer side of a phone's screen
+_PICTURES = Path("reports/pictures")
+_PLOTS = ("position", "error", "voltage", "disturbance", "lateness")
+_HEAP_MB, _FRAME_S, _FRAMES_AT_ONCE = 20.0, 0.15, 200
+_TIME_S = float(
+    os.environ.get("DCMP_PANEL_S", "300")
+)  # of states that are pushed; `make panel-hour` asks 3,600
+_OUTLIER_RAD = 3.21
+
+# What sticks out of its tile, by as little as a pixel.
+_CLIPPED = """
+const names = ".number, .number *, header *, .deeds *, .knob, .knob *, #banner, figcaption";
+return [...document.querySelectorAll(names)]
+  .filter((e) => e.getClientRects().length && getComputedStyle(e).display !== "inline")
+  .filter((e) => e.scrollWidth > e.clientWidth + 1
+    || (e.closest(".number") && e.scrollHeight > e.clientHeight + 1))
+  .map((e) => `${e.tagName} ${e.id} ${e.textContent}`)
+"""
+_OVERLAPPING = """
+const names = ".number h3, .number b, .number p span, .number em, header > *";
+const boxes = [...document.querySelectorAll(names)].filter((e) => e.getClientRects().length)
+  .map((e) => [e.id || e.textContent, e.getBoundingClientRect()]);
+return boxes.flatMap(([a, p], k) => boxes.slice(k + 1)
+  .filter(([, q]) => p.left < q.right - 1 && q.left < p.right - 1)
+  .filter(([, q]) => p.top < q.bottom - 3 && q.top < p.bottom - 3)
+  .map(([b]) => [a, b]));
+"""
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    needed()
+    with own_folder(monkeypatch):
+        yield
+
+
+def _text(page: Chrome, name: str) -> str:
+    return str(page.execute_script("return document.getElementById(arguments[0])?.textContent", name))
+
+
+def _resize(page: Chrome, width: int, height: int) -> None:
+    """Give the page a size, and wait until its plots have it, too."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width <= _PHONE_PX}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    script = (
+        "const boxes = [...document.querySelectorAll('.canvas')];"
+        "return innerWidth === arguments[0] && innerHeight === arguments[1] && boxes.length === 5"
+        " && boxes.every((box) => Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
+        " && Math.abs(box.clientHeight - box.firstChild.clientHeight) < 2)"
+    )
+    until(lambda: page.execute_script(script, width, height), "the plots had the page's size")
+
+
+def _within(page: Chrome, name: str) -> bool:
+    """Return whether all of an element is on the screen, and a click in its middle reaches it."""
+    script = (
+        "const e = document.getElementById(arguments[0]); const b = e.getBoundingClientRect();"
+        "const hit = document.elementFromPoint(b.left + b.width / 2, b.top + b.height / 2);"
+        "return b.top >= 0 && b.left >= 0 && b.right <= innerWidth && b.bottom <= innerHeight"
+        " && b.height >= 40"
+        " && (hit === e || e.contains(hit))"
+    )
+    return bool(page.execute_script(script, name))
+
+
+def _module(page: Chrome, body: str, *arguments: object) -> Any:
+    """Run a script with the page's own modules as `panel`, `plots` and `trace`."""
+    script = (
+        "const done = arguments[arguments.length - 1]; const given = [...arguments].slice(0, -1);"
+        "Promise.all(['panel', 'plots', 'trace'].map((name) => import(`/${name}.js`)))"
+        f".then(async ([panel, plots, trace]) => {{ {body} }}).then(done, (e) => done(String(e)));"
+    )
+    return page.execute_async_script(script, *arguments)
+
+
+def _check_size(page: Chrome, width: int, height: int, name: str) -> None:
+    _resize(page, width, height)
+    page.save_screenshot(str(_PICTURES / f"panel-{name}-{width}x{height}.png"))
+    assert page.execute_script("return document.documentElement.scrollWidth") <= width
+    assert page.execute_script(_CLIPPED) == []
+    assert page.execute_script(_OVERLAPPING) == []
+    for plot in _PLOTS:
+        across, up = _module(page, "return plots.ticksOf(given[0])", plot)
+        assert across >= 3, (plot, width)
+        assert up >= (2 if plot == "lateness" else 3), (plot, width)
+    assert _within(page, "stop")
+    page.execute_script("scrollTo(0, document.documentElement.scrollHeight)")
+    assert _within(page, "stop")
+    page.execute_script("scrollTo(0, 0)")
+
+
+def test_page_is_read_at_every_size_opens_with_history_and_writes_what_is_accepted(tmp_path: Path) -> None:
+    _PICTURES.mkdir(parents=True, exist_ok=True)
+    rig = tmp_path / "ours.toml"
+    copy_rig("bench-1khz", rig)
+    arguments = ("run", str(rig), "--viewer", "none", "--no-record", "--duration", "0")
+    with (
+        started(tmp_path, *arguments, "--set", "backend.kind=sim-board") as run,
+        started(tmp_path, "panel", "--port", str(free_port())) as panel,
+        browser(tmp_path / "chromium") as page,
+    ):
+        until_running(run)
+        until(lambda: status(run.pid)["t_s"] > 4.0, "there is history")
+        change(run.pid, ["controller.kp_1_s2=5200"])
+        page.get(address_of(panel))
+        until(lambda: _text(page, "phase") == "running", "the page showed the phase")
+        first = _module(page, "return trace.trace.t[0]")
+        assert first < 0.5  # the page was not there
+        until(lambda: "5200" in _text(page, "applied-controller.kp_1_s2"), "the gain was read back")
+        for width, height in _SIZES:
+            _check_size(page, width, height, "run")
+        _resize(page, 1366, 768)
+        _keys_reach_everything(page)
+        _diff_is_accepted(page, rig)
+        page.find_element("id", "back").click()
+        until(lambda: _text(page, "applied-controller.kp_1_s2") == "4000", "the gain is that of the start")
+        assert not page.find_element("id", "back").is_enabled()
+        _drawing_that_fails_does_not_keep_from_stop(page)
+        run.communicate(timeout=TIMEOUT_S)
+        assert run.returncode == 0
+
+
+def _keys_reach_everything(page: Chrome) -> None:
+    """Go through the page by Tab: STOP is first, every control comes, and the focus leaves again."""
+    page.execute_script("document.activeElement.blur(); scrollTo(0, 0)")
+    body = page.find_element("tag name", "body")
+    seen = []
+    for _ in range(40):
+        body.parent.switch_to.active_element.send_keys("\ue004")
+        seen.append(page.execute_script("return document.activeElement.id"))
+    assert seen[0] == "stop"
+    for name in ("choice-controller.kind", "slider-observer.mu0_rad_s", "number-reference.rate_rad_s"):
+        assert name in seen
+    assert {"back", "write"} <= set(seen)
+    names = "input, select, button, canvas + *, [role=img]"
+    unnamed = page.execute_script(
+        "return [...document.querySelectorAll(arguments[0])]"
+        ".filter((e) => !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).map((e) => e.outerHTML)",
+        names,
+    )
+    assert [one for one in unnamed if "u-" not in one] == []
+    words = "return document.querySelector('#plot-disturbance [role=img]').ariaLabel"
+    until(lambda: "gravity from" in str(page.execute_script(words)), "the plot was described")
+
+
+def _diff_is_accepted(page: Chrome, rig: Path) -> None:
+    """Refuse over a file that changed, then write; STOP stays within reach meanwhile."""
+    page.find_element("id", "write").click()
+    until(lambda: "+kp_1_s2 = 5200" in _text(page, "sheet-text"), "the diff was shown")
+    page.save_screenshot(str(_PICTURES / "panel-diff-1366x768.png"))
+    assert _within(page, "stop")
+    rig.write_text(rig.read_text("utf-8") + "# of mine\n", "utf-8")
+    page.find_element("id", "sheet-accept").click()
+    until(lambda: "changed meanwhile" in _text(page, "sheet-said"), "it was refused")
+    assert "5200" not in rig.read_text("utf-8")
+    page.find_element("id", "sheet-close").click()
+    page.find_element("id", "write").click()
+    until(lambda: "+kp_1_s2 = 5200" in _text(page, "sheet-text"), "the diff was shown again")
+    page.find_element("id", "sheet-accept").click()
+    until(lambda: _text(page, "sheet-title") == "Written", "it was written")
+    page.find_element("id", "sheet-close").click()
+    assert value_of(load_rig(rig), "controller.kp_1_s2") == 5200.0
+    assert rig.read_text("utf-8").endswith("# of mine\n")
+
+
+def _drawing_that_fails_does_not_keep_from_stop(page: Chrome) -> None:
+    """Break what draws: the numbers go on, and STOP stops."""
+    _module(page, "window.uPlot.prototype = null; trace.trace.columns = null; trace.trace.t = null")
+    shown = _text(page, "time")
+    until(lambda: _text(page, "time") != shown, "the numbers went on")
+    page.find_element("id", "stop").click()
+    until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
+
+
+def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_memory(
+    tmp_path: Path, figure: Callable[[str], None]
+) -> None:
+    _PICTURES.mkdir(parents=True, exist_ok=True)
+    arguments = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0")
+    with (
+        started(tmp_path, *arguments, "--fault", "plant.enc_stuck:at=6s") as run,
+        started(tmp_path, "panel", "--port", str(free_port())) as panel,
+        browser(tmp_path / "chromium") as page,
+    ):
+        page.get(address_of(panel))
+        _, err = run.communicate(timeout=TIMEOUT_S)
+        until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
+        assert _text(page, "banner").startswith("Run ended: ")
+        sentence = _text(page, "banner").removeprefix("Run ended: ").partition(". ")[0]
+        assert " ".join(sentence.split())[:60] in " ".join(err.split())
+        assert page.execute_script("return document.getElementById('banner').className") == "bad"
+        page.refresh()  # a page that is opened after the end
+        until(lambda: _module(page, "return trace.trace.t.length") > 100, "the last seconds were there")
+        for width, height in _SIZES:
+            _resize(page, width, height)
+            page.save_screenshot(str(_PICTURES / f"panel-tripped-{width}x{height}.png"))
+            assert page.execute_script(_CLIPPED) == []
+        assert _module(page, "return getComputedStyle(document.querySelector('#charts')).opacity") == "1"
+        panel.send_signal(signal.SIGSTOP)  # the states are this test's from here on
+        _one_cycle_is_drawn(page)
+        _heap_stays(page, figure)
+
+
+def _one_cycle_is_drawn(page: Chrome) -> None:
+    """Send a bucket in which one cycle is far off: the plot reaches up to it."""
+    low_high = [0.0, 0.0] * len(COLUMNS)
+    low_high[1] = _OUTLIER_RAD
+    state = {"connection": "live", "pid": 1, "t_s": 1.0, "phase": "running", "columns": COLUMNS}
+    state["buckets"] = [[0.04 * k, 0, *(low_high if k == 30 else [0.0] * len(low_high))] for k in range(100)]
+    _module(page, "panel.take(given[0]); await new Promise(requestAnimationFrame)", state)
+    top = "return plots.rangeOf('position')[1]"
+    until(lambda: _module(page, top) > _OUTLIER_RAD, "the plot reached up to the one cycle")
+
+
+def _heap(page: Chrome) -> float:
+    page.execute_cdp_cmd("HeapProfiler.collectGarbage", {})
+    return 1e-6 * float(page.execute_cdp_cmd("Runtime.getHeapUsage", {})["usedSize"])
+
+
+def _heap_stays(page: Chrome, figure: Callable[[str], None]) -> None:
+    """Push states as fast as the page takes them, as texts that it parses: the share of 20 MB an hour."""
+    state: dict[str, Any] = {"connection": "live", "pid": 2, "phase": "running", "columns": COLUMNS}
+    push = (
+        "const [text, first, count] = given;"
+        "for (let k = first; k < first + count; k += 1) {"
+        "  const state = JSON.parse(text); state.t_s = 0.15 * k; state.position_rad = Math.sin(k);"
+        "  state.buckets = [0, 1, 2, 3].map((j) => [0.15 * k + 0.0375 * j, j % 2, "
+        "    ...state.columns.flatMap(() => [Math.sin(k + j), 1 + Math.sin(k + j)])]);"
+        "  panel.take(state);"
+        "}"
+        "await new Promise(requestAnimationFrame);"
+    )
+    text = json.dumps(state)
+    _module(page, push, text, 0, _FRAMES_AT_ONCE)  # 30 s: more than the page keeps
+    before = _heap(page)
+    for first in range(_FRAMES_AT_ONCE, round(_TIME_S / _FRAME_S), _FRAMES_AT_ONCE):
+        _module(page, push, text, first, _FRAMES_AT_ONCE)
+    after = _heap(page)
+    figure(f"heap of the page, {_TIME_S:g} s of states: {before:.1f} -> {after:.1f} MB")
+    assert _module(page, "return trace.trace.t.at(-1)") > _TIME_S - 1.0
+    assert _module(page, "return trace.trace.t.length") <= 600
+    assert after - before < _HEAP_MB * _TIME_S / 3600.0
