@@ -28,6 +28,8 @@ from dcmp_hil.telemetry import signals
 from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
+from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS
+from dcmp_hil.telemetry.rerun.plots import Known, plots
 from dcmp_hil.telemetry.run_plot import draw_run
 from dcmp_hil.telemetry.signals import SIGNALS, by_plot
 from sim_backend.faults.fault_spec import KINDS as FAULTS
@@ -210,9 +212,31 @@ def test_every_plot_of_the_table_is_in_the_dashboard(
     monkeypatch: pytest.MonkeyPatch, more: tuple[signals.Signal, ...]
 ) -> None:
     monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, *more))
-    shown = [str(view.origin) for view in views(dashboard(VIEW).root_container)]
-    assert {signal.plot for signal in more} <= by_plot().keys()
-    assert all(shown.count(plot) == 1 for plot in by_plot())
+    for tripped in (False, True):
+        layout = dashboard(VIEW, tripped=tripped).root_container
+        shown = [str(view.origin) for view in views(layout)]
+        assert all(shown.count(plot.path) == 1 for plot in plots())
+        assert all(shown.count(one.entity) == 1 for one in HISTOGRAMS)
+    assert {signal.plot for signal in more} <= {plot.path for plot in plots()} & by_plot().keys()
+
+
+def test_a_signal_has_a_line_or_a_histogram_and_a_new_one_is_drawn_in_its_plot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    more = replace(SIGNALS[0], column="velocity_raw_rad_s", plot="joint/velocity_rad_s", label="raw")
+    monkeypatch.setattr(signals, "SIGNALS", (*SIGNALS, more))
+    drawn = {plot.path: plot.lines for plot in plots()}
+    told = {column for lines in drawn.values() for line in lines for column in line.columns}
+    assert told | {one.column for one in HISTOGRAMS} == {signal.column for signal in signals.SIGNALS}
+    assert [line.label for line in drawn["joint/velocity_rad_s"]] == ["estimate", "reference", "raw"]
+    assert drawn["joint/velocity_rad_s"][-1].read is more.read
+
+
+def test_a_plot_has_three_lines_at_most() -> None:
+    for known in (Known(truth, model) for truth in (True, False) for model in (True, False)):
+        for plot in plots():
+            assert sum(line.drawn(known) for line in plot.lines) <= 3
+            assert plot.titled.endswith("]")
 
 
 def test_every_plot_of_the_table_is_in_the_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

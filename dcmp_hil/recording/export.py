@@ -8,16 +8,19 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
+from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
+from dcmp_hil.values import Event
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from dcmp_hil.recording.reader import RecordedRun
@@ -62,11 +65,28 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
 
     with _writing(path) as place:
         sink = RerunSink(view_of(run.rig), place, "none")
-        for event in run.events:
-            sink.event(event)
-        for block in run.blocks():
-            sink.block(block)
+        for part in _in_order(run):
+            if isinstance(part, Event):
+                sink.event(part)
+            else:
+                sink.block(part)
         sink.close()
+
+
+def _in_order(run: RecordedRun) -> Iterator[Block | Event]:
+    """Yield cycles and events as they came: what an event changes begins with the cycle of its time."""
+    events = sorted(run.events, key=lambda event: event.t)
+    for block in run.blocks():
+        first = 0
+        while events and events[0].t <= block["t"][-1]:
+            end = int(np.searchsorted(block["t"], events[0].t))
+            if end > first:
+                yield Block(block.rows[first:end], block.model)
+                first = end
+            yield events.pop(0)
+        if first < len(block):
+            yield Block(block.rows[first:], block.model)
+    yield from events
 
 
 def reexecution_to_csv(

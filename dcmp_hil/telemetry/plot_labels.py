@@ -3,6 +3,7 @@
 _UNITS = {
     "_rad_s2": "rad/s²",
     "_rad_s": "rad/s",
+    "_mrad_s": "mrad/s",
     "_mrad": "mrad",
     "_rad": "rad",
     "_N_m": "N·m",

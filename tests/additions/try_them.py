@@ -16,6 +16,7 @@ from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.offline import ReplaySettings
 from dcmp_hil.platform.clock import SimulatedClock
+from dcmp_hil.telemetry.rerun.plots import plots
 from dcmp_hil.telemetry.signals import by_plot
 from sim_backend.faults.fault_spec import FaultSpec
 from tests.contract.benches import PUMPED, WIRED, on_bench
@@ -87,6 +88,7 @@ def main() -> None:
         ],
         "signal": [
             "control/asked_V" in by_plot(),
+            "control/asked_V" in {plot.path for plot in plots()},
             len(plain.columns["asked_V"]) == len(plain.columns["time_s"]),
         ],
         "fault": [_weak() == [1.0, 0.5]],

@@ -44,7 +44,7 @@ rr.connect_grpc(f"rerun+http://127.0.0.1:{sys.argv[1]}/proxy")
 for k in range(200):
     rr.set_time("loop_time", duration=0.01 * k)
     rr.log("events/log", rr.TextLog(sys.argv[3], level="WARN"))
-    rr.log("joint/position_rad", rr.Scalars([77.0, 77.0, 77.0, 77.0]))
+    rr.log("joint/position_rad/lines", rr.Scalars([77.0, 77.0]))
 rr.get_global_data_recording().flush(timeout_sec=20.0)
 print("pushed", flush=True)
 """
@@ -99,7 +99,7 @@ def test_what_is_pushed_into_the_server_reaches_no_file_of_the_run(tmp_path: Pat
     assert not [event for event in recorded.events if "FORGED" in event.text]
     assert abs(recorded.rows).max(initial=0.0, where=recorded.rows == 77.0) == 0.0
     assert "FORGED" not in str(read_back(kept / "run.rrd", "events/log"))
-    assert 77.0 not in values(kept / "run.rrd", "joint/position_rad")
+    assert 77.0 not in values(kept / "run.rrd", "joint/position_rad/lines")
     for written in (kept / "summary.json", tmp_path / "figures.json"):
         assert json.loads(written.read_text())["periods"] > 0
         assert "FORGED" not in written.read_text()

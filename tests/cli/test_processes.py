@@ -61,7 +61,7 @@ def test_recording_is_whole_when_killed(tmp_path: Path) -> None:
     folder = _wait_until_it_records(tmp_path)
     process.kill()
     process.communicate(timeout=_TIMEOUT_S)  # until the telemetry process has left, too
-    assert "joint/position_rad" in entities(folder / "run.rrd")
+    assert "joint/position_rad/lines" in entities(folder / "run.rrd")
 
 
 def test_run_is_paced_by_the_wall_when_not_fast(tmp_path: Path) -> None:

@@ -26,12 +26,15 @@ if TYPE_CHECKING:
 _REPORTS = Path("reports")
 _LOOPBACK = {"0100007F", "00000000000000000000000001000000", "0000000000000000FFFF00000100007F"}
 _VIEWS = {
-    *("Position [rad]", "Velocity [rad/s]", "Disturbance [rad/s²]", "Tracking error [mrad]", "Voltage [V]"),
+    *("Position [rad]", "Velocity [rad/s]", "Disturbance [rad/s²]", "Position errors [mrad]", "Voltage [V]"),
     *(
         "Timing, worst [µs]",
         "All periods [µs]",
         "Phase and states",
         "Events",
+        "State",
+        "Velocity errors [mrad/s]",
+        "Disturbance: estimate error, rest [rad/s²]",
         "Parameters",
         "Pendulum (true)",
         "Phase portrait",
@@ -166,7 +169,7 @@ def test_a_viewer_that_freezes_keeps_neither_the_process_nor_the_file(tmp_path: 
         finally:
             viewer.kill()
     assert done.returncode == 0
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 3000
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad/lines")) == 3000
 
 
 def _reached(viewer: Any, wanted: int) -> int:

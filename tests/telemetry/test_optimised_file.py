@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 _PLENTY_S = 120.0  # s: these machines are shared
-_PLOT = "joint/position_rad"
+_PLOT = "joint/position_rad/lines"
 
 
 @pytest.fixture(scope="module")

@@ -82,4 +82,4 @@ def test_a_recording_explains_itself(tmp_path: Path) -> None:
     place = parameters().drawn.index("controller.kp_1_s2")
     relative: Any = read_back(record, "params_over_start")
     steps = [row[place] for row in relative["Scalars:scalars"]]
-    assert (relative["tick"], steps) == ([499, 500, 999], [1.0, 1.25, 1.25])
+    assert (relative["tick"], steps) == ([0, 500, 999], [1.0, 1.25, 1.25])

@@ -51,8 +51,8 @@ def test_portrait_draws_axes_again_only_when_they_grow() -> None:
     for block in blocks(4000):
         portrait.add(block)
         entities += [entity for entity, _ in (portrait.draw() or (0.0, []))[1]]
-    assert entities.count("phase/axes") < 6
-    assert entities.count("phase/estimate") > 15
+    assert entities.count("portrait/axes") < 6
+    assert entities.count("portrait/estimate") > 15
 
 
 def test_portrait_of_nothing_is_nothing() -> None:

@@ -6,7 +6,6 @@ import dataclasses
 import socket
 import subprocess
 import sys
-from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ import rerun as rr
 
 from dcmp_hil.config import load_rig
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.ipc.ring import FIELDS, Ring
+from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.telemetry.dispatcher import SinkDispatcher
 from dcmp_hil.telemetry.plot_labels import title
@@ -24,8 +23,7 @@ from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
-from dcmp_hil.telemetry.signals import by_plot
-from tests.telemetry.runs import EVENTS, VIEW, T, at, blocks, cycle, entities, feed, read_back, truth, values
+from tests.telemetry.runs import EVENTS, VIEW, T, blocks, cycle, entities, feed, read_back, truth, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,45 +45,6 @@ def _no_display(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name, raising=False)
 
 
-def test_every_signal_arrives_to_the_bit_and_to_the_nanosecond(tmp_path: Path) -> None:
-    record = tmp_path / "run.rrd"
-    columns = feed(RerunSink(VIEW, record, "none"))
-    for plot, signals in by_plot().items():
-        expected = np.stack([columns[signal.column] for signal in signals], axis=1)
-        np.testing.assert_array_equal(values(record, plot), expected)
-    table = read_back(record, "joint/position_rad")
-    assert table["tick"] == list(range(1000))
-    assert table["loop_time"] == [timedelta(milliseconds=k) for k in range(1000)]
-
-
-def test_the_reference_shown_is_that_of_the_sample_s_own_instant(tmp_path: Path) -> None:
-    record = tmp_path / "run.rrd"
-    feed(RerunSink(VIEW, record, "none"))
-    expected = [at(k * T).position for k in range(1000)]
-    assert values(record, "joint/position_rad")[:, 3] == pytest.approx(expected, abs=1e-12)
-
-
-def test_unknown_truth_is_left_out_and_lines_keep_their_names(tmp_path: Path) -> None:
-    record = tmp_path / "run.rrd"
-    feed(RerunSink(dataclasses.replace(VIEW, simulated=False), record, "none"), known=False)
-    table = read_back(record, "joint/velocity_rad_s")
-    assert table["SeriesLines:names"] == [["estimate", "reference"]]
-    assert values(record, "joint/velocity_rad_s").shape == (1000, 2)
-
-
-def test_truth_is_drawn_even_if_the_first_block_is_one_row_without_a_disturbance(tmp_path: Path) -> None:
-    first, second = blocks(2, rows=1)
-    first.rows[0, FIELDS.index("disturbance_true")] = np.nan  # the plant has not moved yet
-    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
-    sink.block(first)
-    sink.block(second)
-    sink.close()
-    table = read_back(tmp_path / "run.rrd", "joint/disturbance_rad_s2")
-    names = ["true (sim)", "estimate", "gravity (model)", "friction (model)", "rest"]
-    assert table["SeriesLines:names"] == [names]
-    assert values(tmp_path / "run.rrd", "joint/disturbance_rad_s2")[1, :2].tolist() == [2.5, 2.0]
-
-
 def test_an_arm_that_shows_the_true_position_at_50_hz(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(VIEW, record, "none"))
@@ -99,16 +58,18 @@ def test_an_arm_that_shows_the_true_position_at_50_hz(tmp_path: Path) -> None:
 def test_phases_events_and_states(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     columns = feed(RerunSink(VIEW, record, "none"))
-    phase, log = read_back(record, "events/phase"), read_back(record, "events/log")
+    phase, log = read_back(record, "phase"), read_back(record, "events/log")
     assert phase["StateChange:state"] == [["settling"], ["engaging"], ["running"]]
     assert phase["tick"] == [0, 250, 500]
     assert log["TextLog:text"] == [[event.text] for event in EVENTS[3:]]
     assert log["TextLog:level"] == [["WARN"], ["INFO"]]
-    voltage = read_back(record, "events/voltage")
+    voltage = read_back(record, "voltage")
     assert voltage["StateChange:state"] == [["within limits"], ["at the limit"], ["within limits"]]
     at_limit = np.flatnonzero(columns["voltage_sent_V"] == 10.0)
     assert voltage["tick"] == [0, at_limit[0], at_limit[-1] + 1]
-    assert read_back(record, "events/samples")["tick"][1:3] == [96, 97]
+    samples = read_back(record, "samples")
+    assert samples["tick"][:3] == [0, 96, 97]
+    assert samples["StateChange:state"][:3] == [["on time"], ["late"], ["on time"]]
 
 
 def test_histogram_counts_every_known_period(tmp_path: Path) -> None:
@@ -126,7 +87,7 @@ def test_histogram_counts_every_known_period(tmp_path: Path) -> None:
 def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(VIEW, record, "none"), periods=200)
-    assert {tuple(row) for row in values(record, "control/voltage_V/limit").tolist()} == {(10.0, -10.0)}
+    assert {tuple(row) for row in values(record, "control/voltage_V/range").tolist()} == {(10.0, -10.0)}
     assert "| controller.kp_1_s2 | 4000 |" in str(read_back(record, "params")["TextDocument:text"])
     assert {"rig/arm/rod", "rig/reference/outline", "rig/motor", "rig/dial"} <= entities(record)
 
@@ -136,14 +97,14 @@ def test_the_limit_is_drawn_from_end_to_end_of_a_long_block(tmp_path: Path) -> N
     (whole,) = blocks(3000, rows=4096)  # as in virtual time
     sink.block(whole)
     sink.close()
-    ticks = read_back(tmp_path / "run.rrd", "control/voltage_V/limit")["tick"]
-    assert ticks == list(range(0, 3000, 20))
+    ticks = read_back(tmp_path / "run.rrd", "control/voltage_V/range")["tick"]
+    assert ticks == [0, 1000, 2000, 2999]
 
 
 def test_no_limit_no_lines(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(dataclasses.replace(VIEW, voltage_limit=None), record, "none"), periods=200)
-    assert not {"control/voltage_V/limit"} & entities(record)
+    assert not {"control/voltage_V/range"} & entities(record)
 
 
 def test_view_of_a_rig_lists_every_key_and_the_gains_first() -> None:
@@ -184,7 +145,7 @@ def test_spawn_without_a_display_warns_and_goes_on(tmp_path: Path) -> None:
     assert "there is no display" in sink.warnings[0]
     assert sink.port is None
     feed(sink, periods=100)
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad/lines")) == 100
 
 
 def test_connect_without_a_viewer_warns_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,7 +157,7 @@ def test_connect_without_a_viewer_warns_and_goes_on(tmp_path: Path, monkeypatch:
     assert MonotonicClock().now_ns() - before_ns < 5e9
     assert "goes on without one" in sink.warnings[0]
     feed(sink, periods=100)
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 100
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad/lines")) == 100
 
 
 def test_connect_to_a_server_that_accepts_and_stays_silent_warns(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,7 +194,7 @@ def test_a_viewer_that_takes_nothing_is_left_behind_and_the_file_stays_whole(
     audience.finish()
     assert len(sink.warnings) == 1
     assert "the run goes on" in sink.warnings[0]
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == 500
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad/lines")) == 500
     assert "is left behind" in str(read_back(tmp_path / "run.rrd", "events/log")["TextLog:text"])
 
 
@@ -290,4 +251,4 @@ def test_nothing_follows_from_an_empty_block(tmp_path: Path) -> None:
     block.rows = block.rows[:0]
     sink.block(block)
     sink.close()
-    assert "joint/position_rad" not in entities(tmp_path / "run.rrd")
+    assert "joint/position_rad/lines" not in entities(tmp_path / "run.rrd")

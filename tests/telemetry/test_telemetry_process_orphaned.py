@@ -53,7 +53,7 @@ def test_the_process_drains_the_ring_and_leaves_when_we_are_killed(
     until(lambda: not Path(f"/proc/{pid}").exists(), "it ended")
     assert noted(notes, "closed") == [""]
     periods = sum(map(int, noted(notes, "rows")))
-    assert len(values(tmp_path / "run.rrd", "joint/position_rad")) == periods
+    assert len(values(tmp_path / "run.rrd", "joint/position_rad/lines")) == periods
 
 
 def test_a_full_disk_costs_one_warning(tmp_path: Path) -> None:

@@ -2,46 +2,64 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import rerun as rr
 import rerun.blueprint as rrb
 
 from dcmp_hil.telemetry.plot_labels import title
-from dcmp_hil.telemetry.rerun import phase_portrait
+from dcmp_hil.telemetry.rerun import banner, phase_portrait
+from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE
-from dcmp_hil.telemetry.rerun.scene import LINK
-from dcmp_hil.telemetry.signals import by_plot
+from dcmp_hil.telemetry.rerun.plots import DISTURBANCE_ERRORS, TIMING, plots
+from dcmp_hil.telemetry.rerun.rails import WINDOW_S
+from dcmp_hil.telemetry.rerun.scene import LANES, LINK, LOG
 
 if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 TIMELINE = "loop_time"
-_WINDOW_S = 10.0  # s on the axis of every plot
-_JOINT, _VOLTAGE, _TIMING = "joint/", "control/voltage_V", "loop/timing_us"  # plots with a place of their own
-_AXIS_LIMIT_RATIO = 1.3  # so that the lines of the limit show
+_FUTURE_S = 1.5  # s on the right of the cursor, where no data are: the legend stands there
+_LEFT_SHARE = 17  # % of the width: what is left is 75 pixels a second on a screen of 1366
+_BACKGROUND_RGB = (15, 17, 20)
+_TRIPPED_RGB = (42, 6, 8)
+_LOG_COLUMNS = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
 
 
-def dashboard(rig: RigView) -> rrb.Blueprint:
-    """Return the layout of the dashboard: the arm, its motion, the motor's voltage, and the loop's timing."""
+def dashboard(rig: RigView, *, tripped: bool = False) -> rrb.Blueprint:
+    """Return the layout of the dashboard: the arm, what happens, how wrong it is, and states.
+
+    Parameters
+    ----------
+    rig
+        What is shown of it.
+    tripped
+        Whether the run ended by a trip: plots are red, and the banner has room for cause and cure.
+    """
     left = rrb.Vertical(_pendulum(rig), _portrait(), _parameters(), row_shares=[36, 32, 32])
-    plots = {path: _plot_of(path, len(signals), rig) for path, signals in by_plot().items()}
-    joint = rrb.Vertical(*(plots[path] for path in plots if path.startswith(_JOINT)))
-    timing = rrb.Horizontal(plots[_TIMING], _histograms(), column_shares=[56, 44])
-    others = [plots[path] for path in plots if not path.startswith(_JOINT) and path != _TIMING]
-    control = rrb.Vertical(*others, timing)
+    shown = [plot for plot in plots() if plot.path != DISTURBANCE_ERRORS or _knows_disturbance(rig)]
+    views = {plot.path: _scrolling(plot.path, plot.titled, tripped=tripped) for plot in shown}
+    happens = rrb.Vertical(*(views[plot.path] for plot in shown if not plot.wrong))
+    wrong = [views[plot.path] for plot in shown if plot.wrong and plot.path != TIMING]
+    timing = rrb.Tabs(views[TIMING], *_histograms(), active_tab=0)
     states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
     if rig.wired:
         states = rrb.Horizontal(_states(), _link(), _events(), column_shares=[36, 24, 40])
-    right = rrb.Vertical(rrb.Horizontal(joint, control), states, row_shares=[80, 20])
-    return opened(rrb.Horizontal(left, right, column_shares=[24, 76]))
+    right = rrb.Vertical(
+        _banner(),
+        rrb.Horizontal(happens, rrb.Vertical(*wrong, timing)),
+        states,
+        row_shares=[15, 70, 15] if tripped else [8, 77, 15],
+    )
+    return opened(rrb.Horizontal(left, right, column_shares=[_LEFT_SHARE, 100 - _LEFT_SHARE]))
 
 
 def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blueprint:
     """Show nothing but `content`, and follow the newest data unless all of it is there already."""
     return rrb.Blueprint(
         content,
-        rrb.TopPanel(state="collapsed"),
+        rrb.TopPanel(state="hidden"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if follow else "paused"),
@@ -50,69 +68,79 @@ def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blu
     )
 
 
-def plot(
-    path: str,
-    *,
-    window: float | None = _WINDOW_S,
-    legend: bool = True,
-    reach: float | None = None,
-    name: str = "",
-    contents: str | list[str] = "$origin/**",
-) -> rrb.TimeSeriesView:
-    """Return the view of a plot.
+def plot(path: str, *, name: str = "", legend: bool = True) -> rrb.TimeSeriesView:
+    """Return the view of a plot that shows all of its data.
 
     Parameters
     ----------
     path
         The entity.
-    window
-        s shown, up to the time cursor; None for everything.
-    legend
-        False where a single line needs no name.
-    reach
-        Fixed range of the value, either way; None fits it to what is shown.
     name
         Title; empty takes it from the path.
-    contents
-        Entities, where it is not the whole of `path`.
+    legend
+        False where a single line needs no name.
     """
     return rrb.TimeSeriesView(
         origin=path,
-        contents=contents,
         name=name or title(path),
-        axis_y=None if reach is None else rrb.ScalarAxis(range=(-reach, reach)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
-        time_ranges=None if window is None else [_last(window)],
     )
 
 
-def _plot_of(path: str, lines: int, rig: RigView) -> rrb.TimeSeriesView:
-    """Return the view of a plot of the table of signals; a single line needs no name."""
-    limit = rig.voltage_limit if path == _VOLTAGE else None
-    return plot(
-        path,
-        legend=lines > 1,
-        reach=None if limit is None else _AXIS_LIMIT_RATIO * limit,
-        name="Timing, worst [µs]" if path == _TIMING else "",
+def _scrolling(path: str, name: str, *, tripped: bool) -> rrb.TimeSeriesView:
+    """Return the view of a plot that scrolls with the cursor, its legend in the empty future."""
+    background = rrb.archetypes.PlotBackground(color=_TRIPPED_RGB, show_grid=True) if tripped else None
+    return rrb.TimeSeriesView(
+        origin=path,
+        name=name,
+        axis_x=_axis(),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=True),
+        background=background,
+        time_ranges=[_last()],
     )
 
 
-def _last(seconds: float) -> rr.VisibleTimeRange:
+def _axis() -> rrb.archetypes.TimeAxis:
+    return rrb.archetypes.TimeAxis(
+        view_range=rr.TimeRange(
+            start=rr.TimeRangeBoundary.cursor_relative(seconds=-WINDOW_S),
+            end=rr.TimeRangeBoundary.cursor_relative(seconds=_FUTURE_S),
+        )
+    )
+
+
+def _last() -> rr.VisibleTimeRange:
     return rr.VisibleTimeRange(
         TIMELINE,
-        start=rr.TimeRangeBoundary.cursor_relative(seconds=-seconds),
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-WINDOW_S),
         end=rr.TimeRangeBoundary.cursor_relative(),
     )
+
+
+def _knows_disturbance(rig: RigView) -> bool:
+    return rig.simulated or math.isfinite(rig.model.gravity)
+
+
+def _banner() -> rrb.Horizontal:
+    lamp = rrb.Spatial2DView(
+        origin=banner.LAMP,
+        name="Lamp",
+        titlebar=False,
+        background=rrb.Background(color=_BACKGROUND_RGB),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-1, 1), y_range=(-1, 1)),
+    )
+    words = rrb.TextDocumentView(origin=banner.PATH, contents=["$origin"], name="State", titlebar=False)
+    return rrb.Horizontal(lamp, words, column_shares=[3, 97])
 
 
 def _pendulum(rig: RigView) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="rig",
         name="Pendulum (true)" if rig.simulated else "Pendulum (measured)",
-        background=rrb.Background(color=(15, 17, 20)),
+        background=rrb.Background(color=_BACKGROUND_RGB),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=(0.5, 0.25, 3.1), look_target=(0, 0, 0), eye_up=(0, 1, 0)
+            kind=rrb.Eye3DKind.Orbital, position=(0.55, 0.28, 3.6), look_target=(0, 0, 0), eye_up=(0, 1, 0)
         ),
     )
 
@@ -121,41 +149,40 @@ def _portrait() -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin=phase_portrait.PATH,
         name="Phase portrait",
-        background=rrb.Background(color=(15, 17, 20)),
+        background=rrb.Background(color=_BACKGROUND_RGB),
         visual_bounds=rrb.VisualBounds2D(x_range=(-1.5, 1.5), y_range=(-1.45, 1.45)),
     )
 
 
 def _link() -> rrb.TimeSeriesView:
-    return plot(LINK, window=None, name="Link: lost, damaged", legend=False)
+    return plot(LINK, name="Link: lost, damaged")
 
 
 def _parameters() -> rrb.Tabs:
     return rrb.Tabs(
         rrb.TextDocumentView(origin=PATH, contents=["$origin"], name="Parameters"),
-        plot(RELATIVE, window=None, name="Changes [of the value at the start]"),
+        plot(RELATIVE, name="Changes [of the value at the start]"),
         rrb.TextDocumentView(origin="about", name="Versions and host"),
+        rrb.TextLogView(origin=LOG, contents=["$origin"], name="All events", columns=_LOG_COLUMNS),
         active_tab=0,
     )
 
 
-def _histograms() -> rrb.Tabs:
+def _histograms() -> list[rrb.BarChartView]:
     legend = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=False)
-    views = [
-        rrb.BarChartView(origin=f"loop/{what}_hist", name=name, plot_legend=legend)
-        for what, name in (
-            ("period", "All periods [µs]"),
-            ("lateness", "All lateness [µs]"),
-            ("compute", "Sample to command [µs]"),
-        )
-    ]
-    return rrb.Tabs(*views, active_tab=0)
+    return [rrb.BarChartView(origin=one.entity, name=one.name, plot_legend=legend) for one in HISTOGRAMS]
 
 
 def _states() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(origin="events", name="Phase and states")
+    return rrb.StateTimelineView(
+        origin="/",
+        contents=[f"+ /{lane}" for lane in LANES],
+        name="Phase and states",
+        titlebar=False,
+        time_view=_axis(),
+    )
 
 
-def _events() -> rrb.TextLogView:
-    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
-    return rrb.TextLogView(origin="events", name="Events", columns=columns)
+def _events() -> rrb.TextDocumentView:
+    """Return the last events, which wrap, and of which the newest is always in sight."""
+    return rrb.TextDocumentView(origin=banner.LAST, contents=["$origin"], name="Events", titlebar=False)

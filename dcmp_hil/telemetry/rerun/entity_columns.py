@@ -8,29 +8,32 @@ import numpy as np
 import rerun as rr
 
 from dcmp_hil.telemetry.link_events import in_order
-from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
-from dcmp_hil.telemetry.rerun.histogram import FixedRangeHistogram
+from dcmp_hil.telemetry.rerun import banner
+from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS, FixedRangeHistogram, Histogram
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
-from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, HISTOGRAMS, LIMITS, LINK, lane_path, turned
+from dcmp_hil.telemetry.rerun.plot_columns import PlotColumns
+from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, LIMITS, LINK, LOG, lane_path, turned
 from dcmp_hil.telemetry.rerun.transitions import TransitionDetector
-from dcmp_hil.telemetry.signals import by_plot
 from dcmp_hil.values import LinkData, PhaseData
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
     from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.telemetry.rerun.plot_columns import Rows
     from dcmp_hil.telemetry.rerun.rig_view import RigView
-    from dcmp_hil.telemetry.signals import Signal
     from dcmp_hil.values import Event
 
-    Call = tuple[str, list[rr.TimeColumn], rr.ComponentColumnList]
+    Call = tuple[str, list[rr.TimeColumn], rr.ComponentColumnList | rr.SeriesLines]
 
 _POSE_RATE_HZ = 50
+_SLOW_RATE_HZ = 1  # of lines that hardly change: a chunk costs 1.6 kB
+_EPILOGUE_TIME_S = 1.0  # s behind a trip that the picture goes on, so that its red lane has a width
 _LATE_MIN_PERIODS = 0.5  # of a period
+_LAMP_RADIUS = 1000.0  # of the view's own units: it fills the view, whatever its shape
 
 
 class Frames:
@@ -40,67 +43,95 @@ class Frames:
     ----------
     rig
         Its limit and its period are used.
-
-    Attributes
-    ----------
-    plots
-        Entity to the signals drawn there, known with the first block.
     """
 
     def __init__(self, rig: RigView) -> None:
-        self.plots: dict[str, list[Signal]] = {}
         self._rig = rig
-        self._histograms = {
-            field: FixedRangeHistogram(low * rig.period, high * rig.period)
-            for field, (_, low, high, _) in HISTOGRAMS.items()
-        }
+        self._plots = PlotColumns(rig)
+        self._banner = banner.Banner()
+        self._lamp: tuple[int, int, int] | None = None  # as it was sent
+        self._histograms = [
+            (one, FixedRangeHistogram(one.low * rig.period, one.high * rig.period)) for one in HISTOGRAMS
+        ]
         self._lanes = {name: TransitionDetector() for name in ("voltage", "samples")}
         self._shown: dict[str, str] = {}  # lane to the newest state
-        self._last_slot = -1
+        self._punctual = np.empty(0)  # s, the first sample, unless it was late
+        self._last_pose = self._last_second = -1  # slots of their rates
+        self._now = 0.0  # s, of the newest data
         self._portrait = Portrait()
         self._parameters = Parameters(rig.parameters, rig.kinds, rig.numbers)
-        self._bucket = rows_per_bucket(rig.period)
 
-    def choose_lines(self, block: Block) -> None:
-        """Leave out the truth, or the model's share, where it is unknown, before the first line is drawn."""
-        # By the position: even a simulation knows no disturbance before its first step.
-        unknown = {"_true_"} if np.isnan(block["position_true"]).all() else set()
-        if np.isnan(block.gravity).all():
-            unknown |= {"gravity_", "friction_", "unexplained_"}
-        for plot, signals in by_plot().items():
-            drawn = [signal for signal in signals if not any(part in signal.column for part in unknown)]
-            if drawn:
-                self.plots[plot] = drawn
+    @property
+    def tripped(self) -> bool:
+        """Whether an event has told of a trip."""
+        return self._banner.tripped
 
     def of_block(self, block: Block) -> list[Call]:
-        """Return the calls for consecutive cycles, at least one."""
-        calls = [*self._lines(block), *self._slow(block), *self._states(block), *self._tuned(block["t"][-1:])]
-        for field, histogram in self._histograms.items():
-            if histogram.add(block["t"], block[field]):
-                calls.append(self._bars(field, block["t"][-1:]))
+        """Return the calls for consecutive cycles, at least one and not more than about a second."""
+        self._now = float(block["t"][-1])
+        calls = [*self._timed(self._plots.of_block(block)), *self._poses(block), *self._states(block)]
+        calls += [*self._slow(block["t"]), *self._lamp_at(self._now)]
+        for one, histogram in self._histograms:
+            if histogram.add(block["t"], block[one.field]):
+                calls.append(self._bars(one, histogram, block["t"][-1:]))
         return calls + self._phase(block)
 
     def of_event(self, event: Event) -> list[Call]:
         """Return the calls for an event."""
         t = np.array([event.t])
-        if isinstance(event.data, PhaseData):
-            return [self._state("phase", t, [event.data.phase])]
         if isinstance(event.data, LinkData):
             counts = np.array([in_order(event.data.counters)])
             return [(LINK, self._times(t), rr.Scalars.columns(scalars=counts))]
-        told = rr.TextLog.columns(text=[event.text], level=[event.level])
-        return [("events/log", self._times(t), told), *self._changed(event)]
+        before = dict(self._parameters.rows)
+        if isinstance(event.data, PhaseData):
+            calls = [self._state("phase", t, [event.data.phase])]
+        else:
+            told = rr.TextLog.columns(text=[event.text], level=[event.level])
+            calls = [(LOG, self._times(t), told), *self._changed(event)]
+        self._banner.take(event, before, self._parameters.rows)
+        return [*calls, *self._words(event.t), *self._timed(self._plots.of_event(event))]
 
     def of_once(self, t: float) -> list[Call]:
-        """Return at `t` what was sent once, or when it changed: the table of parameters, states, axes."""
+        """Return at `t` what was sent once, or when it changed: parameters, states, banner, axes."""
         at = np.array([t])
         states = [self._state(lane, at, [state]) for lane, state in self._shown.items()]
         axes = [(entity, self._times(at), columns) for entity, columns in self._portrait.axes()]
-        return [*self._table(t, {}), *states, *axes]
+        self._lamp = None
+        return [*self._table(t, {}), *self._words(t), *states, *axes]
+
+    def of_end(self) -> list[Call]:
+        """Return the calls behind the last block: lines that are sent seldom end there, a trip lasts 1 s."""
+        calls = list(self._seldom(np.array([self._now])))
+        if self.tripped and "phase" in self._shown:
+            at = np.array([self._now + _EPILOGUE_TIME_S])
+            calls.append(self._state("phase", at, [self._shown["phase"]]))
+        return calls
 
     def of_start(self) -> list[Call]:
         """Return the calls for what the run is tuned by as it begins."""
-        return self._table(0.0, dict(self._parameters.numbers()))
+        return [*self._table(0.0, dict(self._parameters.numbers())), *self._words(0.0)]
+
+    def _words(self, t: float) -> list[Call]:
+        """Return banner, lamp and the last events, as they are now."""
+        times = self._times(np.array([t]))
+        pages = ((banner.PATH, self._banner.text), (banner.LAST, self._banner.last))
+        return [
+            *((path, times, _page(text)) for path, text in pages),
+            *self._lamp_at(t),
+        ]
+
+    def _lamp_at(self, t: float) -> Iterator[Call]:
+        """Yield the lamp where its colour is another than before."""
+        colour = self._banner.colour(t)
+        if colour != self._lamp:
+            self._lamp = colour
+            strip = np.array([[-1.0, 0.0], [1.0, 0.0]])
+            lamp = rr.LineStrips2D.columns(strips=[strip], colors=[colour], radii=[_LAMP_RADIUS])
+            yield banner.LAMP, self._times(np.array([t])), lamp
+
+    def _timed(self, rows: Iterable[Rows]) -> Iterator[Call]:
+        for entity, t, columns in rows:
+            yield entity, self._times(t), columns
 
     def _changed(self, event: Event) -> list[Call]:
         changed = self._parameters.take(event)
@@ -111,20 +142,13 @@ class Frames:
     def _table(self, t: float, numbers: dict[str, float]) -> list[Call]:
         times = self._times(np.array([t]))
         text = table_of(self._rig.name, self._parameters.rows.items())
-        page = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
         lines = [(line_of(key), times, rr.Scalars.columns(scalars=[value])) for key, value in numbers.items()]
-        return [(PATH, times, page), *lines]
+        return [(PATH, times, _page(text)), *lines]
 
     def _tuned(self, t: NDArray[np.float64]) -> Iterator[Call]:
         """Yield all of it over what it was at the start; a line without an end until there is a new one."""
         if self._parameters.drawn:
             yield RELATIVE, self._times(t), rr.Scalars.columns(scalars=[self._parameters.relative])
-
-    def _lines(self, block: Block) -> Iterator[Call]:
-        for plot, signals in self.plots.items():
-            values = np.stack([signal.read(block) for signal in signals], axis=1)
-            t, drawn = peaks(block["t"], values, self._bucket)
-            yield plot, self._times(t), rr.Scalars.columns(scalars=drawn)
 
     def _phase(self, block: Block) -> list[Call]:
         self._portrait.add(block)
@@ -135,11 +159,11 @@ class Frames:
         times = self._times(np.array([t]))
         return [(entity, times, columns) for entity, columns in calls]
 
-    def _slow(self, block: Block) -> Iterator[Call]:
-        """Yield what 50 points a second are enough for: the pendulum, and the lines of the limit."""
+    def _poses(self, block: Block) -> Iterator[Call]:
+        """Yield the pendulum, for which 50 points a second are enough."""
         slots = np.floor(block["t"] * _POSE_RATE_HZ + 1e-6).astype(np.int64)
-        rows = np.flatnonzero(np.diff(slots, prepend=self._last_slot))
-        self._last_slot = int(slots[-1])
+        rows = np.flatnonzero(np.diff(slots, prepend=self._last_pose))
+        self._last_pose = int(slots[-1])
         if not len(rows):
             return
         times = self._times(block["t"][rows])
@@ -147,9 +171,21 @@ class Frames:
         position = np.where(np.isnan(true), block["position"], true)
         for path, angles in ((ARM, position), (GHOST, block.reference[:, 0])):
             yield path, times, rr.Transform3D.columns(quaternion=turned(angles[rows]))
+
+    def _slow(self, t: NDArray[np.float64]) -> Iterator[Call]:
+        """Yield once a second what hardly changes."""
+        slots = np.floor(t * _SLOW_RATE_HZ + 1e-6).astype(np.int64)
+        rows = np.flatnonzero(np.diff(slots, prepend=self._last_second))
+        self._last_second = int(slots[-1])
+        if len(rows):
+            yield from self._seldom(t[rows])
+
+    def _seldom(self, t: NDArray[np.float64]) -> Iterator[Call]:
+        """Yield the lines of the limit, and the parameters over what they were at the start."""
         limit = self._rig.voltage_limit
         if limit is not None:
-            yield LIMITS, times, rr.Scalars.columns(scalars=np.tile([limit, -limit], (len(rows), 1)))
+            yield LIMITS, self._times(t), rr.Scalars.columns(scalars=np.tile([limit, -limit], (len(t), 1)))
+        yield from self._tuned(t[-1:])
 
     def _states(self, block: Block) -> Iterator[Call]:
         limit = self._rig.voltage_limit
@@ -162,24 +198,37 @@ class Frames:
         for lane, (truth, names) in questions.items():
             rows = self._lanes[lane].changes(truth)
             if len(rows):
-                yield self._state(lane, block["t"][rows], [names[int(truth[row])] for row in rows])
+                times = block["t"][rows]
+                yield from self._seen(lane, times, [names[int(truth[row])] for row in rows])
+
+    def _seen(self, lane: str, t: NDArray[np.float64], states: list[str]) -> Iterator[Call]:
+        """Yield new states; the lane of samples is not there, and takes no room, until one is late."""
+        if lane == "samples" and lane not in self._shown:
+            t, states = np.concatenate((self._punctual, t)), ["on time"] * len(self._punctual) + states
+            self._punctual = t[:1]
+            if states == ["on time"]:
+                return
+        yield self._state(lane, t, states)
 
     def _state(self, lane: str, t: NDArray[np.float64], states: list[str]) -> Call:
         self._shown[lane] = states[-1]
         return lane_path(lane), self._times(t), rr.StateChange.columns(state=states)
 
-    def _bars(self, field: str, t: NDArray[np.float64]) -> Call:
-        shown, (entity, _, _, colour) = self._histograms[field], HISTOGRAMS[field]
+    def _bars(self, one: Histogram, shown: FixedRangeHistogram, t: NDArray[np.float64]) -> Call:
         bars = rr.BarChart.columns(
             values=[shown.counts.copy()],
             abscissa=[shown.centres_us],
             widths=[shown.widths_us],
-            color=[colour],
+            color=[one.colour],
         )
-        return entity, self._times(t), bars
+        return one.entity, self._times(t), bars
 
     def _times(self, t: NDArray[np.float64]) -> list[rr.TimeColumn]:
         # Rounded: what Rerun makes of float seconds itself is cut off, and one nanosecond short.
         durations = np.rint(t * 1e9).astype("timedelta64[ns]")
         ticks = np.rint(t / self._rig.period).astype(np.int64)
         return [rr.TimeColumn("loop_time", duration=durations), rr.TimeColumn("tick", sequence=ticks)]
+
+
+def _page(text: str) -> rr.ComponentColumnList:
+    return rr.TextDocument.columns(text=[text], media_type=["text/markdown"])

@@ -7,23 +7,23 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+import rerun as rr
 
 from dcmp_hil.telemetry.block import Block
+from dcmp_hil.telemetry.rerun.blueprint import dashboard
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.font_text import drawable
-from dcmp_hil.telemetry.rerun.scene import log_style
 from dcmp_hil.values import EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import rerun as rr
-
     from dcmp_hil.telemetry.rerun.entity_columns import Call
     from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
-    from dcmp_hil.telemetry.signals import Signal
     from dcmp_hil.values import Event
+
+_PIECE_TIME_S = 1.0  # s: axes and marks follow the run in steps of that length at most
 
 
 class Feed:
@@ -49,6 +49,7 @@ class Feed:
     ) -> None:
         self.outlet = outlet
         self._frames = Frames(rig)
+        self._rig = rig
         self._span, self._period = span, rig.period
         self._again = self._due = again
         self._waiting: list[Block] = []
@@ -74,10 +75,12 @@ class Feed:
     def event(self, event: Event) -> bool:
         """Send an event, behind the periods before it; see `block`."""
         on = event.kind is EventKind.LINK or self.send_rest()  # what an event changes is drawn from there on
-        shown = event._replace(
-            text=drawable(event.text)
-        )  # here: Arrow takes no surrogates, as paths have them
-        return on and self.outlet.do(partial(send, self._frames.of_event(shown)))
+        shown = event._replace(text=drawable(event.text))  # Arrow takes no surrogates, as paths have them
+        tripped = self._frames.tripped
+        on = on and self.outlet.do(partial(send, self._frames.of_event(shown)))
+        if self._frames.tripped and not tripped:
+            on = on and self.outlet.do(partial(_show_trip, self._rig))
+        return on
 
     def send_rest(self) -> bool:
         """Send the blocks that wait; see `block`."""
@@ -85,28 +88,35 @@ class Feed:
             return True
         block = _joined(self._waiting)
         self._waiting = []
-        styles: dict[str, list[Signal]] = {}
-        if not self._frames.plots:
-            self._frames.choose_lines(block)
-            styles = self._frames.plots
-        calls = self._frames.of_block(block)
+        calls = [call for piece in self._cut(block) for call in self._frames.of_block(piece)]
         t = float(block["t"][-1])
         if t >= self._due:
             self._due = t + self._again
             calls += self._frames.of_once(t)
-        return self.outlet.do(partial(_send_block, styles, calls))
+        return self.outlet.do(partial(send, calls))
+
+    def finish(self) -> bool:
+        """Send the blocks that wait, and what stands behind the last one; see `block`."""
+        return self.send_rest() and self.outlet.do(partial(send, self._frames.of_end()))
+
+    def _cut(self, block: Block) -> list[Block]:
+        """Cut what is longer than a second, as in virtual time, into pieces of about a second."""
+        pieces = max(1, round(len(block) * self._period / _PIECE_TIME_S))
+        return [Block(rows, block.model) for rows in np.array_split(block.rows, pieces)]
 
 
 def send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
     """Send the columns of a block to a stream of Rerun."""
     for entity, times, columns in calls:
-        stream.send_columns(entity, times, columns)
+        if isinstance(columns, rr.SeriesLines):
+            stream.log(entity, columns, static=True)
+        else:
+            stream.send_columns(entity, times, columns)
 
 
-def _send_block(styles: dict[str, list[Signal]], calls: Sequence[Call], stream: rr.RecordingStream) -> None:
-    for plot, signals in styles.items():
-        log_style(stream, plot, signals)
-    send(calls, stream)
+def _show_trip(rig: RigView, stream: rr.RecordingStream) -> None:
+    """Send the layout of a run that has tripped; it replaces once what the user had arranged."""
+    stream.send_blueprint(dashboard(rig, tripped=True))
 
 
 def _joined(blocks: list[Block]) -> Block:

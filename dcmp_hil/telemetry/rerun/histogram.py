@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from dcmp_hil.telemetry.signals import ERROR_RGB, FAINT_RGB, TIMING_RGB
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _BIN_COUNT = 61  # odd, so that a nominal period lies in the middle of a bar
 _SEND_PERIOD_S = 1.0  # s between two pictures of it
+
+
+class Histogram(NamedTuple):
+    """A histogram of the dashboard: one row of its table."""
+
+    field: str  # of the block, s
+    column: str  # of the table of signals, which it shows
+    name: str  # title of its tab
+    low: float  # periods
+    high: float  # periods
+    colour: tuple[int, int, int]
+
+    @property
+    def entity(self) -> str:
+        """Return the entity on which it is sent."""
+        return f"loop/{self.field}_hist"
+
+
+HISTOGRAMS = (
+    Histogram("period", "period_us", "All periods [µs]", 0.5, 1.5, TIMING_RGB),
+    Histogram("lateness", "lateness_us", "All lateness [µs]", 0.0, 0.5, ERROR_RGB),
+    Histogram("compute", "compute_us", "Sample to command [µs]", 0.0, 0.5, FAINT_RGB),
+)
 
 
 class FixedRangeHistogram:

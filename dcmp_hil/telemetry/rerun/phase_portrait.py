@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.block import Block
 
-PATH = "phase"
+PATH = "portrait"
 _TRAIL_S = 10.0  # s
 _POINT_RATE_HZ, _PICTURE_RATE_HZ = 50, 5
 _AXIS_HALF_RANGE_MIN = 0.1  # rad and rad/s: a portrait of an arm at rest is not one of its noise

@@ -36,8 +36,7 @@ def begin(
 def warm_up(rig: RigView, _: rr.RecordingStream) -> None:
     """Make the calls of a block without output: the first take 80 ms, for which the loop would wait."""
     frames, block = Frames(rig), Block(np.zeros((2, len(FIELDS))))
-    frames.choose_lines(block)
     stream = TextStream("warm-up")
     nothing = Event(0.0, "INFO", EventKind.OTHER, "")
-    send([*frames.of_start(), *frames.of_block(block), *frames.of_event(nothing)], stream)
+    send([*frames.of_start(), *frames.of_block(block), *frames.of_event(nothing), *frames.of_end()], stream)
     stream.disconnect()

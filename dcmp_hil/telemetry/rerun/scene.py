@@ -9,54 +9,36 @@ import rerun as rr
 
 from dcmp_hil.telemetry.link_events import DEVICE_COUNTERS, HOST_COUNTERS
 from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
+from dcmp_hil.telemetry.rerun.plots import VOLTAGE
 from dcmp_hil.telemetry.signals import (
-    DEMAND_RGB,
     ERROR_RGB,
     ESTIMATE_RGB,
     FAINT_RGB,
     REFERENCE_RGB,
-    TIMING_RGB,
     TRUE_RGB,
-    VOLTAGE_RGB,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from dcmp_hil.telemetry.rerun.rig_view import RigView
-    from dcmp_hil.telemetry.signals import Signal
 
 ARM, GHOST = "rig/arm", "rig/reference"
-LIMITS, LINK = "control/voltage_V/limit", "link/counters"
-HISTOGRAMS = {
-    "period": ("loop/period_hist", 0.5, 1.5, TIMING_RGB),
-    "lateness": ("loop/lateness_hist", 0.0, 0.5, ERROR_RGB),
-    "compute": ("loop/compute_hist", 0.0, 0.5, FAINT_RGB),
-}
-"""Entities of the histograms by field, with bounds in periods and colour."""
+LIMITS, LINK, LOG = f"{VOLTAGE}/range", "link/counters", "events/log"
 LANES = {
     "phase": {
         "probing": FAINT_RGB,
         "settling": FAINT_RGB,
         "engaging": ESTIMATE_RGB,
         "running": REFERENCE_RGB,
+        "stopping": FAINT_RGB,
         "tripped": ERROR_RGB,
     },
-    "voltage": {"within limits": VOLTAGE_RGB, "at the limit": ERROR_RGB},
-    "samples": {"on time": TIMING_RGB, "late": ERROR_RGB},
+    "voltage": {"within limits": (52, 78, 112), "at the limit": ERROR_RGB},
+    "samples": {"on time": (74, 78, 84), "late": ERROR_RGB},
 }
-"""Lanes of the timeline of states, with the colour of each state."""
+"""Lanes of the timeline of states, with the colour of each state: what is as it should be is quiet."""
 
-_LINE_WIDTHS_POINTS = {
-    TRUE_RGB: 5.0,
-    ESTIMATE_RGB: 3.2,
-    REFERENCE_RGB: 1.6,
-    FAINT_RGB: 1.0,
-    DEMAND_RGB: 1.0,
-    VOLTAGE_RGB: 1.6,
-}
 _SERIES_COLOURS = (
     *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
     *((237, 201, 72), (176, 122, 161), (255, 157, 167), (156, 117, 95), (186, 176, 172)),
@@ -67,8 +49,8 @@ _ARM_DEPTH = 0.12  # the arm moves before the dial
 
 
 def lane_path(lane: str) -> str:
-    """Return the entity of a lane."""
-    return f"events/{lane}"
+    """Return the entity of a lane; the view shows it as its name, so it is short."""
+    return lane
 
 
 def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
@@ -90,26 +72,6 @@ def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
     for lane, states in LANES.items():
         look = rr.StateConfiguration(values=list(states), colors=list(states.values()))
         stream.log(lane_path(lane), look, static=True)
-
-
-def log_style(stream: rr.RecordingStream, plot: str, signals: Sequence[Signal]) -> None:
-    """Log how the lines of a plot look."""
-    held = plot.endswith("_V")
-    timing = plot.startswith("loop/")
-    style = rr.SeriesLines(
-        names=[signal.label for signal in signals],
-        colors=[signal.colour for signal in signals],
-        widths=[_width(signal) for signal in signals],
-        # The default averages what falls on one pixel, and hides the spikes that matter here.
-        aggregation_policy="Max" if timing else "MinMax",
-        interpolation_mode="StepAfter" if held else "Linear",
-    )
-    stream.log(plot, style, static=True)
-
-
-def _width(signal: Signal) -> float:
-    """Draw what comes first wider, so that it shows as a rim where lines lie on one another."""
-    return _LINE_WIDTHS_POINTS.get(signal.colour, 1.2)
 
 
 def turned(angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ def write_series(
         path.open("wb").close()
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror or error}. Choose a file you may write.") from None
-    layout = opened(rrb.Vertical(*(plot(name, window=None) for name in plots)), follow=False)
+    layout = opened(rrb.Vertical(*(plot(name) for name in plots)), follow=False)
     stream = TextStream(application)
     times = [rr.TimeColumn(TIMELINE, duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
 

@@ -149,7 +149,7 @@ class RerunSink:
         end_ns = clock.now_ns() + int(_CLOSE_TIMEOUT_S * 1e9)
         atexit.unregister(self.close)
         faults: list[str] = []
-        self._tell(Feed.send_rest)
+        self._tell(Feed.finish)
         for feed in self._feeds:
             try:
                 feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)

@@ -1,0 +1,114 @@
+"""The banner: what the run does, what was changed last, what went wrong, in words and as a lamp."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dcmp_hil.telemetry.rerun.marks import is_trip
+from dcmp_hil.values import CauseData, ChangeData, EventKind, PhaseData
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dcmp_hil.values import Event
+
+PATH, LAMP, LAST = "banner", "lamp", "events/last"
+GREY, GREEN, AMBER, RED = (90, 94, 100), (40, 150, 70), (235, 160, 20), (190, 30, 30)
+_WARNING_TIME_S = 10.0  # s for which a warning has the lamp
+_LAST_COUNT = 12  # events
+_DRIVEN = {"engaging", "running"}
+_LEVELS = {"WARN": "▲ ", "ERROR": "■ "}
+
+
+class Banner:
+    """Follows the events of a run.
+
+    Attributes
+    ----------
+    tripped
+        Whether the run ended by force.
+    """
+
+    def __init__(self) -> None:
+        self.tripped = False
+        self._phase = "arming"
+        self._change = self._warning = self._end = ""
+        self._trip = ("", 0.0)  # cause and time, s
+        self._text = ""
+        self._warned = -_WARNING_TIME_S  # time, s
+        self._last: list[str] = []
+
+    def take(self, event: Event, before: Mapping[str, str], after: Mapping[str, str]) -> None:
+        """Take an event.
+
+        Parameters
+        ----------
+        event
+            Any but counters.
+        before, after
+            Values of the parameters by key, before and after the event.
+        """
+        if isinstance(event.data, PhaseData):
+            self._phase = event.data.phase
+        elif isinstance(event.data, ChangeData):
+            self._change = _in_words(event, event.data, before, after)
+        elif event.level in _LEVELS and not is_trip(event):
+            self._warned, self._warning = event.t, f"{event.t:.3f} s: {event.text}"
+        if event.kind is EventKind.END:
+            self._end = event.text
+        if is_trip(event):
+            self._take_trip(event)
+        if isinstance(event.data, PhaseData):
+            return
+        self._last.insert(0, f"{_LEVELS.get(event.level, '')}**{event.t:.3f} s** {event.text}")
+        del self._last[_LAST_COUNT:]
+
+    def _take_trip(self, event: Event) -> None:
+        cause = event.data.cause if isinstance(event.data, CauseData) else self._trip[0]
+        self._trip = (cause, event.t if not self.tripped else self._trip[1])
+        self.tripped = True
+        if not isinstance(event.data, PhaseData) and not self._text:
+            self._text = event.text
+
+    def colour(self, t: float) -> tuple[int, int, int]:
+        """Return the colour of the lamp at `t`, s."""
+        if self.tripped:
+            return RED
+        if t - self._warned < _WARNING_TIME_S:
+            return AMBER
+        return GREEN if self._phase in _DRIVEN and not self._end else GREY
+
+    @property
+    def text(self) -> str:
+        """Return the banner in Markdown."""
+        if self.tripped:
+            cause, t = self._trip
+            head = f"# TRIPPED: {cause}, at {t:.3f} s" if cause else f"# ENDED BY A FAULT at {t:.3f} s"
+            return f"{head}\n\n{emphasised(self._text, cause)}".rstrip()
+        parts = [
+            f"**{self._phase.upper()}**",
+            self._change,
+            f"▲ {self._warning}" if self._warning else "",
+            f"**ended**: {self._end}" if self._end else "",
+        ]
+        return " · ".join(part for part in parts if part)
+
+    @property
+    def last(self) -> str:
+        """Return the last events in Markdown, the newest first."""
+        return "  \n".join(self._last)
+
+
+def emphasised(text: str, cause: str) -> str:
+    """Return the text of a trip with its first sentence in bold, which is a matter of type only."""
+    plain = text.removeprefix(f"tripped ({cause}): ")
+    first, stop, rest = plain.partition(". ")
+    return f"**{first}{stop.rstrip()}** {rest}".rstrip() if plain else ""
+
+
+def _in_words(event: Event, data: ChangeData, before: Mapping[str, str], after: Mapping[str, str]) -> str:
+    """Return a change, such as ``kp_1_s2 6500 → 4500 at 14.172 s``."""
+    steps = [
+        f"{key.rpartition('.')[2]} {before.get(key, '-')} → {after.get(key, '-')}" for key in data.values
+    ]
+    return f"{', '.join(steps)} at {event.t:.3f} s"

@@ -1,0 +1,94 @@
+"""The banner: what a person reads first."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import rerun as rr
+
+from dcmp_hil.telemetry.rerun.banner import AMBER, GREEN, GREY, LAST, PATH, RED, Banner
+from dcmp_hil.telemetry.rerun.entity_columns import Frames
+from dcmp_hil.values import CauseData, ChangeData, Event, EventKind, LimitData, PhaseData
+from tests.telemetry.runs import VIEW
+from tests.telemetry.test_marks import TRIP
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def phase(name: str, t: float = 0.0) -> Event:
+    return Event(t, "INFO", EventKind.PHASE, "in other words", PhaseData(name))
+
+
+def banner(*events: Event, before: Mapping[str, str] = {}, after: Mapping[str, str] = {}) -> Banner:
+    made = Banner()
+    for event in events:
+        made.take(event, before, after)
+    return made
+
+
+WARNING = Event(2.0, "WARN", EventKind.LIMIT, "voltage limited", LimitData("voltage"))
+CHANGE = Event(14.172, "INFO", EventKind.CHANGE, "x", ChangeData({"controller.kp_1_s2": 4500.0}))
+
+
+def test_phase_last_change_and_last_warning_in_one_sentence() -> None:
+    key = "controller.kp_1_s2"
+    made = banner(phase("running"), WARNING, CHANGE, before={key: "6500"}, after={key: "4500"})
+    assert made.text == "**RUNNING** · kp_1_s2 6500 → 4500 at 14.172 s · ▲ 2.000 s: voltage limited"
+    assert banner(phase("probing")).text == "**PROBING**"
+
+
+def test_a_trip_in_large_words_with_cause_and_cure() -> None:
+    made = banner(phase("running"), phase("tripped", 1.999), TRIP)
+    assert made.text == "# TRIPPED: travel, at 1.999 s\n\n**6.3 rad.** Check it."
+    assert banner(phase("tripped", 3.0)).text == "# ENDED BY A FAULT at 3.000 s"
+    late = Event(5.0, "ERROR", EventKind.DEADLINE, "deadline: 3 are late. Use less.", CauseData("deadline"))
+    assert banner(late).text == "# TRIPPED: deadline, at 5.000 s\n\n**deadline: 3 are late.** Use less."
+    lost = Event(6.0, "ERROR", EventKind.END, "0 V was not confirmed: the device goes there by itself")
+    assert banner(phase("running"), lost).text.startswith("# ENDED BY A FAULT at 6.000 s\n\n**0 V was not")
+
+
+def test_the_first_cause_stays() -> None:
+    later = Event(9.0, "ERROR", EventKind.END, "0 V was not confirmed")
+    assert banner(phase("tripped", 1.999), TRIP, later).text.startswith("# TRIPPED: travel, at 1.999 s")
+    assert "not confirmed" not in banner(TRIP, later).text
+
+
+@pytest.mark.parametrize(
+    ("events", "t", "colour"),
+    [
+        ((), 0.0, GREY),
+        ((phase("settling"),), 0.5, GREY),
+        ((phase("running"),), 1.0, GREEN),
+        ((phase("running"), WARNING), 11.9, AMBER),
+        ((phase("running"), WARNING), 12.1, GREEN),
+        ((phase("running"), WARNING, phase("tripped", 3.0)), 3.0, RED),
+        ((phase("running"), Event(3.0, "INFO", EventKind.END, "amplifier at 0 V")), 3.0, GREY),
+    ],
+)
+def test_the_lamp(events: tuple[Event, ...], t: float, colour: tuple[int, int, int]) -> None:
+    assert banner(*events).colour(t) == colour
+
+
+def test_the_last_events_stand_with_the_newest_first() -> None:
+    made = banner(*(Event(float(k), "INFO", EventKind.OTHER, f"number {k}") for k in range(40)), WARNING)
+    lines = made.last.split("  \n")
+    assert lines[0] == "▲ **2.000 s** voltage limited"
+    assert lines[1] == "**39.000 s** number 39"
+    assert len(lines) == 12
+
+
+def test_what_is_sent_once_comes_again_with_banner_lamp_and_events() -> None:
+    frames = Frames(VIEW)
+    frames.of_event(phase("running"))
+    frames.of_event(WARNING)
+    rr.set_strict_mode(True)
+    calls = {entity: columns for entity, _, columns in frames.of_once(20.0)}
+    assert {PATH, LAST, "lamp", "phase", "params"} <= calls.keys()
+    assert "voltage limited" in _text(calls[PATH])
+    assert "voltage limited" in _text(calls[LAST])
+
+
+def _text(columns: Any) -> str:
+    return " ".join(str(column.as_arrow_array()) for column in columns)
