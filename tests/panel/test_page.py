@@ -43,7 +43,7 @@ return [...document.querySelectorAll(names)]
   .map((e) => `${e.tagName} ${e.id} ${e.textContent}`)
 """
 _OVERLAPPING = """
-const names = ".number h3, .number b, .number p span, .number em, header > *";
+const names = ".number h2, .number b, .number p span, .number em, header > *";
 const boxes = [...document.querySelectorAll(names)].filter((e) => e.getClientRects().length)
   .map((e) => [e.id || e.textContent, e.getBoundingClientRect()]);
 return boxes.flatMap(([a, p], k) => boxes.slice(k + 1)
@@ -190,12 +190,29 @@ def _diff_is_accepted(page: Chrome, rig: Path) -> None:
 
 
 def _drawing_that_fails_does_not_keep_from_stop(page: Chrome) -> None:
-    """Break what draws: the numbers go on, and STOP stops."""
+    """Break what draws, then take uPlot away, then the page's own script: STOP stops."""
     _module(page, "window.uPlot.prototype = null; trace.trace.columns = null; trace.trace.t = null")
+    _numbers_go_on(page)
+    assert "STOP works" in _text(page, "log")
+    _reload_without(page, "*uplot.js")
+    _numbers_go_on(page)
+    until(lambda: "cannot draw its plots" in _text(page, "log"), "the page said what it lacks")
+    _reload_without(page, "*panel.js")
+    assert _text(page, "phase") == "no run"  # it does not know better
+    page.find_element("id", "stop").click()
+    until(lambda: "STOP: confirmed" in _text(page, "log"), "STOP was confirmed")
+
+
+def _numbers_go_on(page: Chrome) -> None:
+    until(lambda: _text(page, "time"), "the time was shown")
     shown = _text(page, "time")
     until(lambda: _text(page, "time") != shown, "the numbers went on")
-    page.find_element("id", "stop").click()
-    until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
+
+
+def _reload_without(page: Chrome, file: str) -> None:
+    page.execute_cdp_cmd("Network.enable", {})
+    page.execute_cdp_cmd("Network.setBlockedURLs", {"urls": [file]})
+    page.refresh()
 
 
 def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_memory(

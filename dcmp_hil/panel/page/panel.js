@@ -1,6 +1,6 @@
 // The page: takes a state from the server a few times a second, and has each part draw its share of it.
 
-import { by } from "./asking.js";
+import { by, log } from "./asking.js";
 import { drawKnobs } from "./knobs.js";
 import { setMarks } from "./marks.js";
 import { drawPhase, endedBadly } from "./phase.js";
@@ -21,7 +21,7 @@ function guarded(name, draw) {
   try {
     draw();
   } catch (error) {
-    if (!failed.has(name)) console.warn(`${name}: ${error}`);
+    if (!failed.has(name)) log({ ok: false, said: `This page cannot draw its ${name} (${error.message}). STOP works.` });
     failed.add(name);
   }
 }

@@ -59,7 +59,7 @@ class Plot {
         ...this.size(),
         legend: { show: false },
         cursor: { show: false },
-        padding: [6, 12, 0, 0],
+        padding: [16, 12, 0, 0], // above: the labels of marks
         scales: { x: { time: false, range: () => this.span() }, y: { range: () => this.range() } },
         axes: [
           { ...axis, size: 24, gap: 3, space: 46, values: (_, ticks) => ticks.map((t) => `${wide(t)} s`) },
