@@ -75,8 +75,9 @@ def test_a_recording_explains_itself(tmp_path: Path) -> None:
     sink.block(second)
     sink.close()
     pages: list[Any] = read_back(record, "params")["TextDocument:text"]
-    assert ["| controller.kp_1_s2 | 4000 |" in str(page) for page in pages] == [True, False]
-    assert "| controller.kp_1_s2 | 5000 |" in str(pages[1])
+    table = r"| **controller** |  |\n| kind | pd_compensated |\n| kp_1_s2 | 4000 |"
+    assert [table in str(page) for page in pages] == [True, False]
+    assert "| kp_1_s2 | 5000 |" in str(pages[1])
     line = read_back(record, "params/controller/kp_1_s2")
     assert (line["tick"], line["Scalars:scalars"]) == ([0, 500], [[4000.0], [5000.0]])
     place = parameters().drawn.index("controller.kp_1_s2")

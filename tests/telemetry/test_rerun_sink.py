@@ -88,7 +88,9 @@ def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(VIEW, record, "none"), periods=200)
     assert {tuple(row) for row in values(record, "control/voltage_V/range").tolist()} == {(10.0, -10.0)}
-    assert "| controller.kp_1_s2 | 4000 |" in str(read_back(record, "params")["TextDocument:text"])
+    assert r"| **controller** |  |\n| kp_1_s2 | 4000 |" in str(
+        read_back(record, "params")["TextDocument:text"]
+    )
     assert {"rig/arm/rod", "rig/reference/outline", "rig/motor", "rig/dial"} <= entities(record)
 
 

@@ -11,10 +11,11 @@ import rerun.blueprint as rrb
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun import banner, phase_portrait
 from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS
+from dcmp_hil.telemetry.rerun.link_columns import LINK
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE
 from dcmp_hil.telemetry.rerun.plots import DISTURBANCE_ERRORS, TIMING, plots
 from dcmp_hil.telemetry.rerun.rails import WINDOW_S
-from dcmp_hil.telemetry.rerun.scene import LANES, LINK, LOG
+from dcmp_hil.telemetry.rerun.scene import LANES, LOG
 
 if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.rig_view import RigView

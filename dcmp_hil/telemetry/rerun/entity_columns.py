@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.link_events import in_order
 from dcmp_hil.telemetry.rerun import banner
 from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS, FixedRangeHistogram, Histogram
-from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, table_of
+from dcmp_hil.telemetry.rerun.link_columns import LinkColumns
+from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, page_of
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
 from dcmp_hil.telemetry.rerun.plot_columns import PlotColumns
-from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, LIMITS, LINK, LOG, lane_path, turned
+from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, LIMITS, LOG, lane_path, turned
 from dcmp_hil.telemetry.rerun.transitions import TransitionDetector
 from dcmp_hil.values import LinkData, PhaseData
 
@@ -47,7 +47,7 @@ class Frames:
 
     def __init__(self, rig: RigView) -> None:
         self._rig = rig
-        self._plots = PlotColumns(rig)
+        self._plots, self._link = PlotColumns(rig), LinkColumns()
         self._banner = banner.Banner()
         self._lamp: tuple[int, int, int] | None = None  # as it was sent
         self._histograms = [
@@ -80,8 +80,7 @@ class Frames:
         """Return the calls for an event."""
         t = np.array([event.t])
         if isinstance(event.data, LinkData):
-            counts = np.array([in_order(event.data.counters)])
-            return [(LINK, self._times(t), rr.Scalars.columns(scalars=counts))]
+            return list(self._timed(self._link.of_counters(event.t, event.data.counters)))
         before = dict(self._parameters.rows)
         if isinstance(event.data, PhaseData):
             calls = [self._state("phase", t, [event.data.phase])]
@@ -141,7 +140,7 @@ class Frames:
 
     def _table(self, t: float, numbers: dict[str, float]) -> list[Call]:
         times = self._times(np.array([t]))
-        text = table_of(self._rig.name, self._parameters.rows.items())
+        text = page_of(self._rig.name, self._parameters.rows)
         lines = [(line_of(key), times, rr.Scalars.columns(scalars=[value])) for key, value in numbers.items()]
         return [(PATH, times, _page(text)), *lines]
 
@@ -151,7 +150,8 @@ class Frames:
             yield RELATIVE, self._times(t), rr.Scalars.columns(scalars=[self._parameters.relative])
 
     def _phase(self, block: Block) -> list[Call]:
-        self._portrait.add(block)
+        if not self.tripped:  # a bad count in the last cycle would set its axes
+            self._portrait.add(block)
         found = self._portrait.draw()
         if found is None:
             return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.formatting import toml_value
@@ -83,6 +84,15 @@ class Parameters:
 def line_of(key: str) -> str:
     """Return the entity of a number."""
     return f"{PATH}/{key.replace('.', '/')}"
+
+
+def page_of(head: str, rows: Mapping[str, str]) -> str:
+    """Return parameters as a table with a heading for each section, so that keys are short, in Markdown."""
+    sections: dict[str, list[tuple[str, str]]] = {}
+    for key, value in rows.items():
+        section, _, name = key.rpartition(".")
+        sections.setdefault(section, [(f"**{section}**", "")]).append((name, value))
+    return table_of(head, chain.from_iterable(sections.values()))
 
 
 def table_of(head: str, rows: Iterable[tuple[str, str]]) -> str:

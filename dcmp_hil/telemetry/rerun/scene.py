@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.link_events import DEVICE_COUNTERS, HOST_COUNTERS
 from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
 from dcmp_hil.telemetry.rerun.plots import VOLTAGE
 from dcmp_hil.telemetry.signals import (
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 ARM, GHOST = "rig/arm", "rig/reference"
-LIMITS, LINK, LOG = f"{VOLTAGE}/range", "link/counters", "events/log"
+LIMITS, LOG = f"{VOLTAGE}/range", "events/log"
 LANES = {
     "phase": {
         "probing": FAINT_RGB,
@@ -62,13 +61,6 @@ def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
     if rig.voltage_limit is not None:
         style = rr.SeriesLines(names=["limit", "limit"], colors=[(130, 60, 60)] * 2, widths=[1.0] * 2)
         stream.log(LIMITS, style, static=True)
-    if rig.wired:
-        names = [
-            *(f"host: {name}" for name in HOST_COUNTERS),
-            *(f"device: {name}" for name in DEVICE_COUNTERS),
-        ]
-        style = rr.SeriesLines(names=[name.replace("_", " ") for name in names], widths=[1.6] * len(names))
-        stream.log(LINK, style, static=True)
     for lane, states in LANES.items():
         look = rr.StateConfiguration(values=list(states), colors=list(states.values()))
         stream.log(lane_path(lane), look, static=True)
