@@ -168,8 +168,14 @@ class Server:
         written = self._ring.written
         if written != self._written:
             self._written, self._newest_ns = written, self._clock.now_ns()
-            self._envelopes.add(self._ring.drain())
+            self._take_in()
         return parent_lives(self._parent)
+
+    def _take_in(self) -> None:
+        """Add the newest cycles to what is drawn of the run; STOP does not depend on it."""
+        rows = self._ring.drain()
+        with suppress(ArithmeticError, ValueError, TypeError, LookupError):
+            self._envelopes.add(rows)
 
     def stop(self, by: int = STOP_REQUEST) -> asyncio.Task[Stopped]:
         """End the run once, by force if it does not answer."""
@@ -236,7 +242,7 @@ class Server:
             await asyncio.sleep(_POLL_PERIOD_S)
         self._over = True
         said = self._mailbox.last_words or "it died; the device goes to 0 V by itself."
-        self._envelopes.add(self._ring.drain())
+        self._take_in()
         self._envelopes.finish()
         ended = {"ended": said, "at_zero": self._mailbox.end == AT_ZERO, "late": self._envelopes.late}
         ended["last_phase"] = phase_name(self._mailbox.phase)

@@ -102,7 +102,8 @@ class Envelopes:
         numbers = np.floor(t / BUCKET_S)
         starts = np.flatnonzero(np.diff(numbers, prepend=np.nan) != 0.0)
         ends = np.append(starts[1:], len(t)) - 1
-        values = _drawn(block)
+        with np.errstate(all="ignore"):  # numbers without bound are drawn as none
+            values = _drawn(block)
         low, high = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
         counts = np.add.reduceat(late.astype(np.int64), starts)
         for k, (start, end) in enumerate(zip(starts, ends, strict=True)):

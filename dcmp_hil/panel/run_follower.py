@@ -64,8 +64,6 @@ class Watcher:
     async def _follow(self, pid: int) -> None:
         reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE_BYTES_MAX)
         self.run = pid
-        self.history.clear()
-        self.state = {"connection": "live"}
         try:
             writer.write(b'{"do": "watch"}\n')
             while line := await self._next_line(reader):
@@ -75,6 +73,8 @@ class Watcher:
 
     def _take(self, state: dict[str, Any]) -> None:
         """Keep a state; the last words of a run are added to the state before."""
+        if state.get("pid", self.state.get("pid")) != self.state.get("pid"):
+            self.history.clear()
         self.history.add(state.pop("buckets", []))
         if "ended" in state:
             self.state = {**self.state, **state, "connection": "ended"}

@@ -156,3 +156,51 @@ async def _last_line(rig: _Rig, place: Path) -> dict[str, Any]:
         writer.close()
         last: dict[str, Any] = json.loads(lines[-1])
         return last
+
+
+def test_watchers_get_what_was_before_them_and_the_last_cycle(rig: _Rig, tmp_path: Path) -> None:
+    for k in range(12):
+        rig.ring.push(cycle(0.01 * k, position=float(k)), Truth(0.0, 0.0, 0.0))
+    rig.server.look()
+    lines = asyncio.run(_watched(rig, tmp_path / "s"))
+    buckets = [bucket for line in lines for bucket in line["buckets"]]
+    assert [bucket[2:4] for bucket in buckets] == [[0.0, 3.0], [4.0, 7.0], [8.0, 11.0], [99.0, 99.0]]
+    assert lines[0]["columns"][0] == "position_rad"
+    assert (lines[0]["late"], lines[0]["missed"]) == (0, 0)
+    assert lines[-1]["last_phase"] == "running"
+
+
+async def _watched(rig: _Rig, place: Path) -> list[dict[str, Any]]:
+    """Watch from now to the end; one more cycle comes in between."""
+    async with await asyncio.start_unix_server(rig.server.serve, place):
+        reader, writer = await asyncio.open_unix_connection(place)
+        writer.write(b'{"do": "watch"}\n')
+        lines = [await reader.readline()]
+        rig.mailbox.tell_phase(4)
+        rig.ring.push(cycle(0.13, position=99.0), Truth(0.0, 0.0, 0.0))
+        await rig.server.say_goodbye()
+        while b'"ended"' not in lines[-1]:
+            lines.append(await asyncio.wait_for(reader.readline(), 5.0))
+        writer.close()
+        return [json.loads(line) for line in lines]
+
+
+def test_the_state_names_changes_and_the_way_back(rig: _Rig, tmp_path: Path) -> None:
+    kp = "controller.kp_1_s2"
+    _, state, _, back = asyncio.run(
+        rig.ask(
+            tmp_path / "s", _change(f"{kp}=5200"), {"do": "status"}, _change(f"{kp}=4000"), {"do": "status"}
+        )
+    )
+    assert state["marks"] == [[3.25, f"{kp}: 4000 -> 5200"]]
+    assert state["back"] == [f"{kp}=4000"]
+    assert f"{kp}=5200" in state["values"]
+    assert 'controller.kind="pd_compensated"' in state["values"]
+    assert (back["back"], len(back["marks"])) == ([], 2)
+
+
+def test_a_picture_that_fails_ends_no_command_process(rig: _Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_server.Envelopes, "add", lambda *_: 1 / 0)
+    rig.ring.push(cycle(0.5), Truth(0.0, 0.0, 0.0))
+    rig.server.look()
+    assert (rig.server.state()["t_s"], len(rig.ring)) == (0.5, 1)

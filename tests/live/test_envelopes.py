@@ -110,6 +110,17 @@ def test_what_is_no_number_is_null_and_the_reference_is_not_drawn_before_it_begi
     json.dumps([first, second], allow_nan=False)
 
 
+@pytest.mark.filterwarnings("error")
+def test_absurd_numbers_are_drawn_as_none_without_a_word() -> None:
+    envelopes = Envelopes(bench())
+    rows = _rows(50, position=1e308, position_reference=-1e308, disturbance_estimate=1.7e308)
+    rows[3, FIELDS.index("t")] = math.nan
+    rows[7] = math.inf
+    envelopes.add(rows)
+    envelopes.add(rows[:0])
+    json.dumps(_all(envelopes), allow_nan=False)
+
+
 @pytest.mark.parametrize("rate", [20.0, 1000.0, 10_000.0])
 def test_memory_and_lines_are_bounded_at_any_rate(rate: float) -> None:
     rig = bench()
