@@ -15,6 +15,7 @@ from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import command_server
+from dcmp_hil.live.envelopes import Envelopes
 from dcmp_hil.values import Truth
 from tests.helpers import bench, cycle
 
@@ -200,7 +201,7 @@ def test_the_state_names_changes_and_the_way_back(rig: _Rig, tmp_path: Path) -> 
 
 
 def test_a_picture_that_fails_ends_no_command_process(rig: _Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command_server.Envelopes, "add", lambda *_: 1 / 0)
+    monkeypatch.setattr(Envelopes, "add", lambda *_: 1 / 0)
     rig.ring.push(cycle(0.5), Truth(0.0, 0.0, 0.0))
     rig.server.look()
     assert (rig.server.state()["t_s"], len(rig.ring)) == (0.5, 1)
