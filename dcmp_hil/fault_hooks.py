@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _Stage = TypeVar("_Stage")
 _INJECT, _NEEDS_WIRE = "sim_backend.faults.plan:inject", "sim_backend.faults.plan:needs_wire"
+_KINDS = "sim_backend.faults.plan:kinds"
 
 
 class Faults(Protocol):
@@ -83,3 +84,8 @@ def needs_wire(faults: Iterable[str]) -> bool:
     """Whether one of the faults is of a wire or of the firmware, which the plain simulated rig has not."""
     listed = tuple(faults)
     return bool(listed) and cast("bool", find_named(_NEEDS_WIRE, "faults")(listed))
+
+
+def kinds() -> dict[str, tuple[str, ...]]:
+    """Return the kinds of fault that can be injected, each with its keys."""
+    return cast("dict[str, tuple[str, ...]]", find_named(_KINDS, "faults")())

@@ -12,6 +12,7 @@ from typer.exceptions import TyperException
 from dcmp_hil import __version__
 from dcmp_hil.cli import console, streams
 from dcmp_hil.cli.check import check
+from dcmp_hil.cli.completion import completion
 from dcmp_hil.cli.conform import conform
 from dcmp_hil.cli.device import device
 from dcmp_hil.cli.export import export
@@ -67,6 +68,7 @@ EVERYWHERE: dict[str, Callable[..., None]] = {
     "export": export,
     "rigs": rigs,
     "view": view,
+    "completion": completion,
 }
 ON_LINUX: dict[str, Callable[..., None]] = {
     "device": device,

@@ -123,6 +123,15 @@ HELP = {
             "dcmp-hil conform can0 --link can --node 2",
         ),
     ),
+    "completion": CommandHelp(
+        SHELL,
+        "Print a completion script for bash, zsh or fish.",
+        (
+            "dcmp-hil completion bash",
+            "dcmp-hil completion zsh",
+            "dcmp-hil completion fish",
+        ),
+    ),
 }
 """By name, in the order in which they are listed."""
 

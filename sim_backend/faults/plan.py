@@ -66,6 +66,11 @@ def needs_wire(faults: Iterable[str | FaultSpec]) -> bool:
     return any(kind in KINDS and KINDS[kind].wired for kind in named)
 
 
+def kinds() -> dict[str, tuple[str, ...]]:
+    """Return the kinds of fault, each with its keys."""
+    return {name: (*kind.params, "at", "for") for name, kind in KINDS.items()}
+
+
 def inject(rig: Rig, faults: Iterable[object], key: str = "faults:") -> Injector:
     """Prepare faults for one run of a rig; their seed is the simulation's.
 

@@ -80,6 +80,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
     },
     "rigs": {"--copy": (OUT, ("--copy", "bench-1khz", "{folder}/copy.toml"))},
     "view": {"--port": (("--port", "{served}"),)},
+    "completion": {"SHELL": (("bash",), ("zsh",), ("fish",))},
     "device": {
         "RIG": (OUT, ("{rig}",)),
         "--set": given("--set", "encoder.counts_per_rev=8192"),

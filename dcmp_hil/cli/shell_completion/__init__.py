@@ -1,0 +1,1 @@
+"""Scripts with which a shell completes command lines of `dcmp-hil`."""
