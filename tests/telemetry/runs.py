@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import TYPE_CHECKING
+from datetime import timedelta
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -123,6 +124,14 @@ def read_back(path: Path, entity: str) -> dict[str, list[object]]:
             for name in batch.schema.names:
                 table.setdefault(name, []).extend(batch.column(name).to_pylist())
     return table
+
+
+def periods_of(table: dict[str, list[object]]) -> list[int]:
+    """Return the number of the period of each row; the rows are at its sample to the nanosecond."""
+    times = [cast("timedelta", time) for time in table["loop_time"] if time is not None]
+    found = [round(time / timedelta(seconds=T)) for time in times]
+    assert times == [number * timedelta(seconds=T) for number in found]
+    return found
 
 
 def entities(path: Path) -> set[str]:

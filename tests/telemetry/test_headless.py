@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 from dcmp_hil.platform.clock import pause
@@ -16,6 +15,7 @@ from dcmp_hil.telemetry.rerun import sink as rerun_sink
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, VOLTAGE_RGB
+from tests.telemetry.pixels import coloured
 from tests.telemetry.runs import EVENTS, VIEW, blocks, feed, values
 from tools import screenshot as screenshots
 from tools.screenshot import headless_viewer, look, screenshot, wait_until_loaded
@@ -61,15 +61,6 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[RerunSink]:
     sink = RerunSink(VIEW, None, "spawn", port=23_000)
     yield sink
     sink.close()
-
-
-def coloured(picture: Path, colour: tuple[int, int, int]) -> int:
-    """Return the number of pixels of about this colour."""
-    from PIL import Image
-
-    with Image.open(picture) as image:
-        pixels = np.asarray(image.convert("RGB"), dtype=np.int16)
-    return int((np.abs(pixels - np.array(colour)).max(axis=-1) < 24).sum())
 
 
 def listening(process: int | str) -> set[str]:

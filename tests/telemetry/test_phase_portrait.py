@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dcmp_hil.control.model import Model
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.link_events import DEVICE_COUNTERS, HOST_COUNTERS, LinkWatch, in_order
-from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
+from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket, single
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait, round_up
 from dcmp_hil.telemetry.signals import columns
 from dcmp_hil.values import Event, EventKind, LinkData
@@ -132,3 +132,12 @@ def test_disturbance_is_gravity_and_friction_by_the_model_and_a_rest() -> None:
     whole = table["gravity_rad_s2"] + table["friction_rad_s2"] + table["unexplained_rad_s2"]
     assert whole == pytest.approx(table["disturbance_estimate_rad_s2"])
     assert np.isnan(columns(Block(block.rows))["gravity_rad_s2"]).all()
+
+
+def test_singles_are_the_nearest_and_too_large_ones_stay_finite() -> None:
+    values = np.array([[0.1, -1e300], [np.nan, np.inf]])
+    drawn = single(values)
+    assert drawn[0, 0] == np.float64(np.float32(0.1))
+    assert drawn[0, 1] == -float(np.finfo(np.float32).max)
+    assert np.isnan(drawn[1, 0])
+    assert np.isfinite(drawn[1, 1])

@@ -23,7 +23,19 @@ from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
-from tests.telemetry.runs import EVENTS, VIEW, T, blocks, cycle, entities, feed, read_back, truth, values
+from tests.telemetry.runs import (
+    EVENTS,
+    VIEW,
+    T,
+    blocks,
+    cycle,
+    entities,
+    feed,
+    periods_of,
+    read_back,
+    truth,
+    values,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,7 +61,7 @@ def test_an_arm_that_shows_the_true_position_at_50_hz(tmp_path: Path) -> None:
     record = tmp_path / "run.rrd"
     feed(RerunSink(VIEW, record, "none"))
     table = read_back(record, "rig/arm")
-    assert table["tick"] == list(range(0, 1000, 20))
+    assert periods_of(table) == list(range(0, 1000, 20))
     quaternions = np.array(table["Transform3D:quaternion"]).reshape(-1, 4)
     angles = 2.0 * np.arctan2(quaternions[:, 2], quaternions[:, 3])
     assert angles == pytest.approx(np.sin(T * np.arange(0, 1000, 20)), abs=1e-6)
@@ -60,15 +72,15 @@ def test_phases_events_and_states(tmp_path: Path) -> None:
     columns = feed(RerunSink(VIEW, record, "none"))
     phase, log = read_back(record, "phase"), read_back(record, "events/log")
     assert phase["StateChange:state"] == [["settling"], ["engaging"], ["running"]]
-    assert phase["tick"] == [0, 250, 500]
+    assert periods_of(phase) == [0, 250, 500]
     assert log["TextLog:text"] == [[event.text] for event in EVENTS[3:]]
     assert log["TextLog:level"] == [["WARN"], ["INFO"]]
     voltage = read_back(record, "voltage")
     assert voltage["StateChange:state"] == [["within limits"], ["at the limit"], ["within limits"]]
     at_limit = np.flatnonzero(columns["voltage_sent_V"] == 10.0)
-    assert voltage["tick"] == [0, at_limit[0], at_limit[-1] + 1]
+    assert periods_of(voltage) == [0, at_limit[0], at_limit[-1] + 1]
     samples = read_back(record, "samples")
-    assert samples["tick"][:3] == [0, 96, 97]
+    assert periods_of(samples)[:3] == [0, 96, 97]
     assert samples["StateChange:state"][:3] == [["on time"], ["late"], ["on time"]]
 
 
@@ -77,11 +89,11 @@ def test_histogram_counts_every_known_period(tmp_path: Path) -> None:
     feed(RerunSink(VIEW, record, "none"), periods=2100)
     table: dict[str, list[Any]] = read_back(record, "loop/period_hist")
     last: Any = table["BarChart:values"][-1]
-    assert sum(last[0]["buffer"]) == table["tick"][-1]
-    assert len(table["tick"]) >= 2
+    assert sum(last[0]["buffer"]) == periods_of(table)[-1]
+    assert len(periods_of(table)) >= 2
     for what in ("lateness", "compute"):  # the first period has these
         bars: Any = read_back(record, f"loop/{what}_hist")["BarChart:values"][-1]
-        assert sum(bars[0]["buffer"]) == table["tick"][-1] + 1
+        assert sum(bars[0]["buffer"]) == periods_of(table)[-1] + 1
 
 
 def test_limits_parameters_and_pendulum_are_there(tmp_path: Path) -> None:
@@ -99,7 +111,7 @@ def test_the_limit_is_drawn_from_end_to_end_of_a_long_block(tmp_path: Path) -> N
     (whole,) = blocks(3000, rows=4096)  # as in virtual time
     sink.block(whole)
     sink.close()
-    ticks = read_back(tmp_path / "run.rrd", "control/voltage_V/range")["tick"]
+    ticks = periods_of(read_back(tmp_path / "run.rrd", "control/voltage_V/range"))
     assert ticks == [0, 1000, 2000, 2999]
 
 

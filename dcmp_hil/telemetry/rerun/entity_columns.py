@@ -225,9 +225,7 @@ class Frames:
 
     def _times(self, t: NDArray[np.float64]) -> list[rr.TimeColumn]:
         # Rounded: what Rerun makes of float seconds itself is cut off, and one nanosecond short.
-        durations = np.rint(t * 1e9).astype("timedelta64[ns]")
-        ticks = np.rint(t / self._rig.period).astype(np.int64)
-        return [rr.TimeColumn("loop_time", duration=durations), rr.TimeColumn("tick", sequence=ticks)]
+        return [rr.TimeColumn("loop_time", duration=np.rint(t * 1e9).astype("timedelta64[ns]"))]
 
 
 def _page(text: str) -> rr.ComponentColumnList:

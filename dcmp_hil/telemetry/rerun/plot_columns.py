@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket
+from dcmp_hil.telemetry.rerun.decimation import peaks, rows_per_bucket, single
 from dcmp_hil.telemetry.rerun.marks import MARKS, Marks, is_trip, mark_of
 from dcmp_hil.telemetry.rerun.plots import VOLTAGE, Known, Line, Plot, known_of, plots
 from dcmp_hil.telemetry.rerun.rails import Rails
@@ -69,7 +69,7 @@ class PlotColumns:
         self._marks.forget(float(block["t"][0]))
         for drawn in self._drawn:
             t, values = peaks(block["t"], self._values(drawn, block), self._bucket)
-            yield f"{drawn.plot.path}/lines", t, rr.Scalars.columns(scalars=values)
+            yield f"{drawn.plot.path}/lines", t, rr.Scalars.columns(scalars=single(values))
             times, ends = drawn.rails.add(t, values)
             yield from _rails(drawn, times, ends)
             yield from self._due_marks(drawn)
