@@ -15,8 +15,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_STEPS = (1.05, 1.5, 2.05)
-"""Ends of an axis over 10^k; the last one needs plots of 93 pixels."""
+_STEPS = (1.05, 1.5, 1.9)
+"""Ends of an axis over 10^k; the last one needs plots of 84 pixels."""
 _COARSE_STEPS = (1.05, 1.5)  # for lower plots, down to 70 pixels
 _REACH_MIN = 1.05  # below 1 no step has a number
 WINDOW_S = 6.0  # s that a plot shows
