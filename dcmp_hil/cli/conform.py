@@ -96,7 +96,8 @@ def conform(  # noqa: PLR0913, PLR0917 - typer takes them by name
     if list_them:
         for check in chosen:
             needs = "  (--arm)" if check.needs_arm else ""
-            console.out.print(Text(f"{check.name:22} section {check.section:3} {check.says}{needs}"))
+            line = f"{check.name:22} section {check.section:3} "
+            console.print_sentence(console.out, Text(f"{line}{check.says}{needs}"), indent=len(line))
         return
     if port is None:
         raise ConfigError(
@@ -214,9 +215,9 @@ def _show(said: Console, outcome: Outcome) -> None:
         )
     )
     if verdict == Verdict.FAILED:
-        said.print(Text(f"            the page: {check.says}"))
+        console.print_sentence(said, Text(f"            the page: {check.says}"), indent=12)
     for finding in outcome.findings:
-        said.print(Text(f"            {finding}"))
+        console.print_sentence(said, Text(f"            {finding}"), indent=12)
 
 
 def _sum_up(said: Console, counts: Counter[Verdict], ended_by: str) -> None:

@@ -51,24 +51,34 @@ def take_width(console: Console) -> None:
             console.width = columns
 
 
-def print_sentence(console: Console, text: Text) -> None:
-    """Print one line; on a terminal it is broken between words, and a word that is too long is left whole."""
+def print_sentence(console: Console, text: Text, indent: int = 0) -> None:
+    """Print one line; on a terminal it is broken between words, and a word that is too long is left whole.
+
+    Parameters
+    ----------
+    console
+        Where to.
+    text
+        The line.
+    indent
+        Columns by which the second and every later line is moved to the right.
+    """
     if console.is_terminal:
         take_width(console)
-        lines = text.divide(_breaks(text.plain, console.width))
+        lines = text.divide(_breaks(text.plain, console.width, indent))
         for line in lines:
             line.rstrip()
-        text = Text("\n").join(lines)
+        text = Text(f"\n{' ' * indent}").join(lines)
     console.print(text, soft_wrap=True)
 
 
-def _breaks(text: str, columns: int) -> list[int]:
+def _breaks(text: str, columns: int, indent: int) -> list[int]:
     """Return where the second and every later line begins."""
     breaks, used = [], 0
     for word in re.finditer(r"\s*\S+\s*", text):
-        if used and used + cell_len(word[0].rstrip()) > columns:
+        if used > indent and used + cell_len(word[0].rstrip()) > columns:
             breaks.append(word.start())
-            used = 0
+            used = indent
         used += cell_len(word[0])
     return breaks
 

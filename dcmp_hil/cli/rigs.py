@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from dcmp_hil.cli import console
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
+
+_NAME_COLUMNS = 12
 
 
 def rigs(
@@ -28,11 +31,12 @@ def rigs(
         return
     for name in shipped_rigs():
         rig = load_rig(name)
-        console.out.print(
-            f"[bold]{name:12}[/bold] {rig.loop.rate_hz:g} Hz, encoder {_counts(rig)}, "
-            f"observer {rig.observer.kind}, backend {rig.backend.kind}",
-            highlight=False,
+        facts = (
+            f" {rig.loop.rate_hz:g} Hz, encoder {_counts(rig)}, observer {rig.observer.kind}, "
+            f"backend {rig.backend.kind}"
         )
+        line = Text.assemble((f"{name:{_NAME_COLUMNS}}", "bold"), facts)
+        console.print_sentence(console.out, line, indent=_NAME_COLUMNS + 1)
 
 
 def _counts(rig: Rig) -> str:

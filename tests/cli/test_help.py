@@ -105,15 +105,17 @@ def test_a_wrong_command_line_is_one_sentence_and_what_was_meant(
     assert outcome.err.count("\n") == 1
 
 
-def test_an_error_on_a_terminal_is_broken_between_words(
-    installed: Path, cli: Callable[..., Outcome], tmp_path: Path
+@pytest.mark.parametrize("arguments", [WRONG, ("rigs",), ("conform", "--list")])
+def test_a_line_on_a_terminal_is_broken_between_words(
+    installed: Path, cli: Callable[..., Outcome], tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:
-    plain = cli(*WRONG).err
+    outcome = cli(*arguments)
+    plain = outcome.err + outcome.out
     assert max(map(len, plain.splitlines())) > COLUMNS
-    shown = call([str(installed), *WRONG], TERMINAL, tmp_path, {"COLUMNS": None, "NO_COLOR": "1"})
+    shown = call([str(installed), *arguments], TERMINAL, tmp_path, {"COLUMNS": None, "NO_COLOR": "1"})
     lines = re.sub(r"\x1b\[[\d;]*m", "", shown.err).split("\r\n")
-    assert shown.code == 2
-    assert " ".join(" ".join(lines).split()) == " ".join(plain.split())
+    assert shown.code == outcome.code
+    assert " ".join(lines).split() == plain.split()
     assert max(map(len, lines)) <= COLUMNS
 
 
