@@ -45,6 +45,7 @@ _CHANGE_TIMEOUT_S = 1.0  # s for the loop to take a change
 _POLL_PERIOD_S = 0.002  # s
 _STATE_PERIOD_S = 0.1  # s between two states that are sent to every watcher
 _CHECK_PERIOD_S = 0.05  # s between two looks at the run: whether it lives, and its newest cycle
+_LOOKS_PER_INTAKE = 2  # what is drawn of the run is brought up to date as often as it is sent
 _MARKS_MAX = 8  # changes that a state names
 _STOP_ANSWER_TIMEOUT_S = 0.3  # s for those who asked for STOP to be answered in, after the end
 
@@ -101,6 +102,7 @@ class Server:
         self._watchers: dict[asyncio.StreamWriter, int] = {}  # and the next bucket of each
         self._envelopes = Envelopes(setup.rig)
         self._marks: deque[tuple[float, str]] = deque(maxlen=_MARKS_MAX)
+        self._looks = 0  # at new cycles
         self._over = False  # the last words are sent
         self._connections = ConnectionPool()
 
@@ -168,7 +170,9 @@ class Server:
         written = self._ring.written
         if written != self._written:
             self._written, self._newest_ns = written, self._clock.now_ns()
-            self._take_in()
+            if self._looks % _LOOKS_PER_INTAKE == 0:
+                self._take_in()
+            self._looks += 1
         return parent_lives(self._parent)
 
     def _take_in(self) -> None:

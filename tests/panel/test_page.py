@@ -12,7 +12,7 @@ import pytest
 
 from dcmp_hil.config import copy_rig, load_rig
 from dcmp_hil.live.client import change, status
-from dcmp_hil.live.envelopes import COLUMNS
+from dcmp_hil.live.envelopes import COLUMNS, HISTORY_S
 from dcmp_hil.live.tunables import value_of
 from tests.live.processes import TIMEOUT_S, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
@@ -130,8 +130,8 @@ def test_page_is_read_at_every_size_opens_with_history_and_writes_what_is_accept
         change(run.pid, ["controller.kp_1_s2=5200"])
         page.get(address_of(panel))
         until(lambda: _text(page, "phase") == "running", "the page showed the phase")
-        first = _module(page, "return trace.trace.t[0]")
-        assert first < 0.5  # the page was not there
+        first, last = _module(page, "return [trace.trace.t[0], trace.trace.t.at(-1)]")
+        assert last - first > min(last, HISTORY_S) - 0.5  # the page was not there
         until(lambda: "5200" in _text(page, "applied-controller.kp_1_s2"), "the gain was read back")
         for width, height in _SIZES:
             _check_size(page, width, height, "run")
@@ -221,12 +221,12 @@ def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_m
     _PICTURES.mkdir(parents=True, exist_ok=True)
     arguments = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0")
     with (
-        started(tmp_path, *arguments, "--fault", "plant.enc_stuck:at=6s") as run,
         started(tmp_path, "panel", "--port", str(free_port())) as panel,
         browser(tmp_path / "chromium") as page,
     ):
         page.get(address_of(panel))
-        _, err = run.communicate(timeout=TIMEOUT_S)
+        with started(tmp_path, *arguments, "--fault", "plant.enc_stuck:at=6s") as run:
+            _, err = run.communicate(timeout=TIMEOUT_S)
         until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
         assert _text(page, "banner").startswith("Run ended: ")
         sentence = _text(page, "banner").removeprefix("Run ended: ").partition(". ")[0]
@@ -250,9 +250,10 @@ def _one_cycle_is_drawn(page: Chrome) -> None:
     low_high[1] = _OUTLIER_RAD
     state = {"connection": "live", "pid": 1, "t_s": 1.0, "phase": "running", "columns": COLUMNS}
     state["buckets"] = [[0.04 * k, 0, *(low_high if k == 30 else [0.0] * len(low_high))] for k in range(100)]
-    _module(page, "panel.take(given[0]); await new Promise(requestAnimationFrame)", state)
-    top = "return plots.rangeOf('position')[1]"
-    until(lambda: _module(page, top) > _OUTLIER_RAD, "the plot reached up to the one cycle")
+    draw = (  # again, should a state of before have been on its way
+        "panel.take(given[0]); await new Promise(requestAnimationFrame);return plots.rangeOf('position')[1]"
+    )
+    until(lambda: _module(page, draw, state) > _OUTLIER_RAD, "the plot reached up to the one cycle")
 
 
 def _heap(page: Chrome) -> float:
