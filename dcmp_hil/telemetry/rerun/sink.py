@@ -52,6 +52,7 @@ _RESEND_PERIOD_S = 10.0  # s
 _FILE_BLOCK_DURATION_S = 1.0  # s of a run that go into a file at once
 _VIEWER_TIMEOUT_S = 5.0  # s, for a viewer that is
 _OPTIMISE_TIMEOUT_S = 5.0  # s, for a file that is whole already
+_BLOCK_BYTES = 300e3  # bytes: a second of a file at 1 kHz, which is written behind the look at the disk
 _START_DATA_BYTES = 400e3  # bytes: scenery and layout are 250 kB
 
 
@@ -176,7 +177,7 @@ class RerunSink:
         """End the file while there is room for the run's data, which comes before its picture."""
         for feed in tuple(self._feeds):
             file = feed.outlet.file
-            if file is not None and self._needed and short_of(file, self._needed):
+            if file is not None and self._needed and short_of(file, self._needed + _BLOCK_BYTES):
                 feed.outlet.leave()
                 self._feeds.remove(feed)
                 self.warnings.append(spared(file, "ends here", self._needed))
