@@ -6,6 +6,7 @@ import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.errors import DcmpError, ExitCode
@@ -30,7 +31,7 @@ def set_keys(
     """
     from dcmp_hil.live.client import change, find_run
 
-    console.out.print(change(find_run(run), changes), highlight=False, markup=False)
+    console.print_sentence(console.out, Text(change(find_run(run), changes)))
 
 
 def stop(run: Run = None) -> None:
@@ -53,7 +54,7 @@ def tell_stopped(stopped: tuple[int, Stopped] | DcmpError) -> None:
     pid, (end, said) = stopped
     sentence = f"the run of process {pid}: {said}"
     if end is End.CONFIRMED:
-        console.out.print(sentence, highlight=False, markup=False)
+        console.print_sentence(console.out, Text(sentence))
     else:
         console.complain(DcmpError(sentence))
     codes = {
@@ -82,7 +83,7 @@ def status(run: Run = None) -> None:
         _number(state.get("voltage_V"), "voltage {:+.2f} V"),
         str(state.get("fault") or "no fault"),
     ]
-    console.out.print("  ".join(part for part in parts if part), highlight=False, markup=False)
+    console.print_sentence(console.out, Text("  ".join(part for part in parts if part)))
 
 
 def _phase(state: dict[str, Any]) -> str:

@@ -61,9 +61,10 @@ def ports(
     for finding in find_devices(port or (), baud, bitrate, MonotonicClock(), wait, history=verbose):
         found += 1
         console.out.print(Text.assemble((finding.place, "bold"), f"  {finding.description}"))
-        console.out.print(Text(f"    {finding.device}", "green" if finding.settings else "dim"))
+        device = Text(f"    {finding.device}", "green" if finding.settings else "dim")
+        console.print_sentence(console.out, device, indent=4)
         if finding.history:
-            console.out.print(Text(f"    {finding.history}"))
+            console.print_sentence(console.out, Text(f"    {finding.history}"), indent=4)
         if finding.settings:
             sets = [word for key in finding.settings for word in ("--set", f"backend.{key}")]
             console.out.print(Text(f"    {shlex.join(['dcmp-hil', 'run', *sets])}"))
