@@ -105,14 +105,18 @@ def _check_size(page: Chrome, width: int, height: int, name: str) -> None:
     assert page.execute_script("return document.documentElement.scrollWidth") <= width
     assert page.execute_script(_CLIPPED) == []
     assert page.execute_script(_OVERLAPPING) == []
-    for plot in _PLOTS:
-        across, up = _module(page, "return plots.ticksOf(given[0])", plot)
-        assert across >= 3, (plot, width)
-        assert up >= (2 if plot == "lateness" else 3), (plot, width)
+    _check_axes(page)
     assert _within(page, "stop")
     page.execute_script("scrollTo(0, document.documentElement.scrollHeight)")
     assert _within(page, "stop")
     page.execute_script("scrollTo(0, 0)")
+
+
+def _check_axes(page: Chrome) -> None:
+    for plot in _PLOTS:
+        across, up = _module(page, "return plots.ticksOf(given[0])", plot)
+        assert across >= 3, plot
+        assert up >= (2 if plot == "lateness" else 3), plot
 
 
 def test_page_is_read_at_every_size_opens_with_history_and_writes_what_is_accepted(tmp_path: Path) -> None:
@@ -238,6 +242,7 @@ def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_m
             _resize(page, width, height)
             page.save_screenshot(str(_PICTURES / f"panel-tripped-{width}x{height}.png"))
             assert page.execute_script(_CLIPPED) == []
+            _check_axes(page)
         assert _module(page, "return getComputedStyle(document.querySelector('#charts')).opacity") == "1"
         panel.send_signal(signal.SIGSTOP)  # the states are this test's from here on
         _one_cycle_is_drawn(page)

@@ -63,7 +63,7 @@ class Plot {
         scales: { x: { time: false, range: () => this.span() }, y: { range: () => this.range() } },
         axes: [
           { ...axis, size: 24, gap: 3, space: 46, values: (_, ticks) => ticks.map((t) => `${wide(t)} s`) },
-          { ...axis, size: 52, gap: 4, space: 26, values: (_, ticks) => ticks.map(wide) },
+          { ...axis, size: 52, gap: 4, space: 17, values: (_, ticks) => ticks.map(wide) },
         ],
         series: [{}, ...series],
         bands,
