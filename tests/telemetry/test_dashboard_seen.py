@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("vulkan")
 
-_HOURS_S = 7200.0  # s: labels of ticks are longest then
+_HOURS_S = 8000.0  # s: labels of ticks are longest then, "+2h 13m 20s"
 _SIZE = "1366x768"
-_SHOWN_TIME_S = 7.5  # s on the axis of a plot
+_SHOWN_TIME_S = 6.5  # s on the axis of a plot
 _TICK_STRIP_PX, _NUMBER_STRIP_PX = 17, 40  # below a plot, left of it
+_LABELLED_SHARE_MIN = 0.4  # of the columns, that letters light; 0.1 where one label of six is there
 _DOT_PX = 14  # of a line's colour in the legend, with its edge
 _TRIP_RGB, _CURSOR_RGB = (255, 40, 40), (200, 200, 200)
 _LINES_RGB = (ESTIMATE_RGB, REFERENCE_RGB, ERROR_RGB, VOLTAGE_RGB)  # others are like letters
@@ -85,7 +86,7 @@ def test_every_second_has_a_tick(seen: dict[str, NDArray[np.int16]]) -> None:
     for name, picture in seen.items():
         assert picture.shape[1] / _SHOWN_TIME_S >= 65.0, name
         strip = picture[-_TICK_STRIP_PX:].min(axis=-1).max(axis=0)
-        assert texts(strip > 120, gap=12) >= 7, name
+        assert (strip > 120).mean() > _LABELLED_SHARE_MIN, name
 
 
 def test_every_value_axis_has_three_numbers(seen: dict[str, NDArray[np.int16]]) -> None:

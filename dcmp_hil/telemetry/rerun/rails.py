@@ -19,7 +19,8 @@ _STEPS = (1.05, 1.5, 1.9)
 """Ends of an axis over 10^k; the last one needs plots of 84 pixels."""
 _COARSE_STEPS = (1.05, 1.5)  # for lower plots, down to 70 pixels
 _REACH_MIN = 1.05  # below 1 no step has a number
-WINDOW_S = 6.0  # s that a plot shows
+WINDOW_S = 5.0
+"""Seconds that a plot shows: on a screen of 1366 a label such as "+1h 12m 40s" has room at each of them."""
 _SLOT_S = 1.0  # s
 
 
@@ -50,7 +51,7 @@ class Rails:
         self.coarse = False
 
     def reach(self, t: float) -> float:
-        """Return the end of the axis that shows the last 6 s before `t`, s."""
+        """Return the end of the axis that shows the last 5 s before `t`, s."""
         first = math.floor(t - WINDOW_S)
         return self._end(max((most for slot, most in self._most.items() if slot >= first), default=0.0))
 
