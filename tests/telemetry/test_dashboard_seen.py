@@ -114,3 +114,13 @@ def test_a_trip_is_a_mark_from_end_to_end_of_every_plot(
     for name, picture in seen.items():
         inside = picture[:-_TICK_STRIP_PX]
         assert (like(inside, _TRIP_RGB).mean(axis=0).max() > 0.9) == tripped, name
+
+
+def test_plots_are_red_after_a_trip(
+    seen: dict[str, NDArray[np.int16]], request: pytest.FixtureRequest
+) -> None:
+    tripped = "tripped" in request.node.name
+    for name, picture in seen.items():
+        inside = picture[:-_TICK_STRIP_PX]
+        redder = inside[..., 0] > inside[..., 1] + 20
+        assert (redder.mean() > 0.5) == tripped, name

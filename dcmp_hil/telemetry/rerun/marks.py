@@ -61,6 +61,10 @@ class Marks:
     def __init__(self) -> None:
         self._marks: list[_Mark] = []
 
+    def __len__(self) -> int:
+        """Count them."""
+        return len(self._marks)
+
     def add(self, kind: str, t: float) -> None:
         """Add a mark of a kind at `t`, s, unless there is one just before it."""
         if not any(mark.kind == kind and abs(t - mark.t) < _REPEAT_TIME_MIN_S for mark in self._marks):

@@ -65,10 +65,11 @@ class PlotColumns:
             self._drawn = self._choose(known_of(block))
             for drawn in self._drawn:
                 yield from _styles(drawn)
-        self._now = float(block["t"][-1])
-        self._marks.forget(float(block["t"][0]))
+        every = block["t"]
+        self._now = float(every[-1])
+        self._marks.forget(float(every[0]))
         for drawn in self._drawn:
-            t, values = peaks(block["t"], self._values(drawn, block), self._bucket)
+            t, values = peaks(every, self._values(drawn, block), self._bucket)
             yield f"{drawn.plot.path}/lines", t, rr.Scalars.columns(scalars=single(values))
             times, ends = drawn.rails.add(t, values)
             yield from _rails(drawn, times, ends)
@@ -110,6 +111,8 @@ class PlotColumns:
         return values
 
     def _due_marks(self, drawn: DrawnPlot) -> Iterator[Rows]:
+        if not self._marks:
+            return
         axis = drawn.rails.reach(self._now)
         for kind, at, reach in self._marks.due(drawn.plot.path, self._now, axis):
             entity = f"{drawn.plot.path}/marks/{kind}"

@@ -74,12 +74,16 @@ class Rails:
         tuple
             Times of the rows that are due, s, shape (m,), and the end of the axis at each, shape (m,).
         """
-        slots = np.floor(t / _SLOT_S + 1e-6).astype(np.int64)
-        starts = np.flatnonzero(np.diff(slots, prepend=slots[0] - 1))
-        size = np.abs(values).max(axis=1, initial=0.0, where=~np.isnan(values))
+        first, last = (math.floor(float(one) / _SLOT_S + 1e-6) for one in (t[0], t[-1]))
+        size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         rows: list[tuple[float, float]] = []
-        for first, most in zip(starts.tolist(), np.maximum.reduceat(size, starts).tolist(), strict=True):
-            rows += self._grow(int(slots[first]), float(t[first]), most)
+        if first == last:  # nine of ten blocks of a viewer: it takes a third of the time
+            rows += self._grow(first, float(t[0]), float(size.max()))
+        else:
+            slots = np.floor(t / _SLOT_S + 1e-6)
+            starts = np.flatnonzero(np.diff(slots, prepend=slots[0] - 1))
+            for start, most in zip(starts.tolist(), np.maximum.reduceat(size, starts).tolist(), strict=True):
+                rows += self._grow(int(slots[start]), float(t[start]), most)
         self._most = {slot: most for slot, most in self._most.items() if slot >= self._slot - WINDOW_S - 1}
         table = np.array(rows, dtype=np.float64).reshape(-1, 2)
         return table[:, 0], table[:, 1]
