@@ -160,7 +160,8 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> tuple[FFI, Any]:
 
 
 def _declarations(folder: Path) -> str:
-    text = (folder / "dcmp_frame.h").read_text() + (folder / "dcmp_protocol.h").read_text()
+    headers = ("dcmp_frame.h", "dcmp_protocol.h", "dcmp_message.h")
+    text = "".join((folder / name).read_text() for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).replace("DCMP_PAYLOAD_MAX", "8")
     text = text.replace("\\\n", "")
     return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
@@ -179,6 +180,17 @@ def test_c_packs_and_unpacks_as_cantools_does(core: tuple[FFI, Any], name: str) 
         back: Any = ffi.new(f"struct dcmp_{name.lower()} *")
         unpack(frame, back)
         assert {field: int(getattr(back, field)) for field in fields} == fields
+
+
+@pytest.mark.parametrize("number", [0, 2, 6], ids=["before the first", "a gap", "behind the last"])
+def test_c_takes_no_number_without_a_message(core: tuple[FFI, Any], number: int) -> None:
+    """Also not a frame without payload, which has the length of such a number's row in the table."""
+    ffi, lib = core
+    assert number not in {_message(name).frame_id >> 4 for name in NAMES}
+    for length in range(9):
+        frame: Any = ffi.new("struct dcmp_frame *", (16 * number + 3, length, [0] * 8))
+        assert lib.dcmp_check_any(frame, 3) == lib.DCMP_FOREIGN
+        assert lib.dcmp_check(frame, 3) == lib.DCMP_FOREIGN
 
 
 def test_c_has_the_values(core: tuple[FFI, Any]) -> None:

@@ -72,7 +72,8 @@ def header(found: list[Layout]) -> str:
     }
     if twice:
         raise ValueError(f"two constants of C have one name: {', '.join(sorted(twice))}")
-    parts = [_INCLUDES, _identifiers(found), *map(_enum, named), _layouts(found), *map(_struct, found)]
+    tables = [_layouts(found), _from_host(found)]
+    parts = [_INCLUDES, _identifiers(found), *map(_enum, named), *tables, *map(_struct, found)]
     parts.append("/* Packing seals; unpacking takes a frame that was found genuine. */")
     parts[-1] += "".join(f"\n{_pack_head(one)};" for one in found) + "\n"
     parts.append("\n".join(f"{_unpack_head(one)};" for one in found) + "\n")
@@ -132,6 +133,13 @@ def _layouts(found: list[Layout]) -> str:
         rows.append(f"    {row + ',':12} /* {one.name if one else 'no message'} */ \\\n")
     head = "/* By message number, which is identifier / 16: length, and whether the host sends it. */"
     return f"{head}\n#define DCMP_LAYOUTS {{ \\\n{''.join(rows)}}}\n"
+
+
+def _from_host(found: list[Layout]) -> str:
+    """Return the list of the messages that a device must receive, for an acceptance filter of CAN."""
+    rows = ", \\\n".join(f"    DCMP_{one.name}" for one in found if one.from_host)
+    head = "/* Identifiers, of node 0, of the messages that the host sends. */"
+    return f"{head}\n#define DCMP_FROM_HOST {{ \\\n{rows} \\\n}}\n"
 
 
 def _struct(layout: Layout) -> str:
