@@ -25,7 +25,7 @@ from tools.protocol.page import page
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from cantools.database.can import Database, Message, Signal
+    from cantools.database.can import Message, Signal
 
 DBC = """VERSION "1"
 NS_ :
@@ -54,6 +54,11 @@ BO_ 80 LAST: 6 DEVICE
  SG_ two : 32|1@1+ (1,0) [0|1] "" HOST
  SG_ three : 33|1@1+ (1,0) [0|1] "" HOST
  SG_ crc8 : 40|8@1+ (1,0) [0|255] "" HOST
+CM_ BO_ 16 "Wide fields.";
+CM_ BO_ 48 "Fields across bytes.";
+CM_ BO_ 64 "Few fields.";
+CM_ BO_ 80 "The last.";
+CM_ SG_ 16 id "A kind.";
 BA_DEF_ BO_ "PythonClass" STRING ;
 BA_DEF_ BO_ "CStruct" STRING ;
 BA_DEF_ SG_ "PythonEnum" STRING ;
@@ -217,27 +222,3 @@ def test_a_field_is_typed_in_the_dbc_alone() -> None:
     assert "    put(&frame->data[6], (uint8_t)message->temperature_C, 1);\n" in c_code.pack(found)
     assert "    message->temperature_C = (int8_t)frame->data[6];\n" in c_code.unpack(found)
     assert "`temperature_C` 48, s8 degC" in page(PAGE.read_text("utf-8"), load(text), found, 0)
-
-
-# --------------------------------------------------------------------------- layouts that are none
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("SG_ high : 16|16@1-", "SG_ high : 23|16@0-", r"^WIDE\.high is not little-endian$"),
-        ("16|16@1- (1,0)", "16|16@1- (0.1,0)", r"^WIDE\.high has a scale or an offset; "),
-        ("16|16@1- (1,0)", "16|16@1- (1,5)", r"^WIDE\.high has a scale or an offset; "),
-        ("[-32768|32767]", "[0|0]", r"^WIDE\.high has no bounds$"),
-        ("0|12@1+", "0|12@1-", r"^WIDE: low, lone: a signed field shares no byte$"),
-        ("16|24@1+", "16|24@1-", r"^SPARSE: counts: a signed field has 8, 16 or 32 bits$"),
-        ("22|10@1+", "22|2@1+", r"^ACROSS: first, flag, second: fields share 1, 2 or 4 bytes, not 3$"),
-        ("SG_ crc8 : 40|8", "SG_ crc : 40|8", r"^LAST: its last byte is not its crc8$"),
-        ('2 "SQUARE"', '2 "WIDE"', r"^two constants of C have one name: DCMP_WIDE$"),
-    ],
-)
-def test_what_is_not_known_is_refused(old: str, new: str, said: str) -> None:
-    assert DBC.count(old) == 1
-    database: Database = load(DBC.replace(old, new))
-    with pytest.raises(ValueError, match=said):
-        c_code.header(layouts(database))

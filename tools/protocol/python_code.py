@@ -8,10 +8,12 @@ import sys
 from typing import TYPE_CHECKING
 
 from tools.protocol.dbc import ROOT
-from tools.protocol.layout import MARK, Enumeration, Field, Layout, Word, enumerations_of
+from tools.protocol.layout import MARK, Field, Layout, Word, enumerations_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+
+    from tools.protocol.enumerations import Enumeration
 
 _LINE_LENGTH_MAX = 110
 _FILE = "dcmp_hil/wire/messages.py"  # whose rules the formatter takes
