@@ -76,6 +76,13 @@ RULES = [
     ('CM_ BO_ 112 "The answer to HELLO.";\n', "", r"IDENTITY has no comment; say when it is sent: CM_ BO_"),
     ("STOP: 2", "Stop: 2", "Stop: a message's name has capitals, digits and single _"),
     ("EDGE: 8", "DRIVE_: 8", "DRIVE_: a message's name has capitals"),
+    ("EDGE: 8", "SHARP__EDGE: 8", "SHARP__EDGE: a message's name has capitals"),
+    (
+        '"SampleReport"',
+        '"sample-report"',
+        "SAMPLE: its PythonClass is 'sample-report'; write it as in SampleRep",
+    ),
+    ('"dcmp_edge_stamp"', '"edge"', "EDGE: its CStruct is 'edge'; write it as in dcmp_edge_stamp"),
     # Places
     ("8|32@1-", "8|32@0-", r"PARAMETER_VALUE\.value is not little-endian; write @1, and its lowest bit"),
     ("SG_ ttl_ms : 48|8", "SG_ ttl_ms : 47|8", r"DRIVE: session and ttl_ms overlap; ttl_ms can begin at bit"),

@@ -8,6 +8,7 @@ from collections import Counter
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from tools.protocol.dbc import attribute
 from tools.protocol.statements import DbcError
 
 if TYPE_CHECKING:
@@ -19,8 +20,13 @@ _LENGTHS = range(2, 9)  # bytes: a field and the crc8 at least, a classic CAN fr
 _OTHER_SIDE = {"HOST": "DEVICE", "DEVICE": "HOST"}
 _FIELD_NAME, _CONSTANT_NAME = (
     re.compile(r"[a-z](?:\w*[A-Za-z0-9])?"),
-    re.compile(r"[A-Z](?:[A-Z0-9_]*[A-Z0-9])?"),
+    re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*"),
 )
+_KINDS = {
+    "PythonClass": (re.compile(r"[A-Z]\w*"), "SampleReport"),
+    "CStruct": (re.compile(r"dcmp_[a-z0-9_]+"), "dcmp_edge_stamp"),
+}
+"""Forms of the names that a message may give its class and its structure."""
 _UNIT = re.compile(r"[\w%/^ .-]*")
 _OF_C = re.compile(
     "auto|bool|break|case|char|const|continue|default|do|double|else|enum|extern|false|float|for|goto|if|inline|"
@@ -40,18 +46,25 @@ def check(database: Database) -> None:
         If one breaks a rule.
     """
     for message in database.messages:
+        _check_names(message)
         _check_message(message)
         for signal in message.signals:
             _check_field(f"{message.name}.{signal.name}", signal)
             _check_bounds(f"{message.name}.{signal.name}", signal)
             _check_values(f"{message.name}.{signal.name}", signal)
-    check_once("messages", (message.name.lower() for message in database.messages))
+
+
+def _check_names(message: Message) -> None:
+    name = message.name
+    if not _CONSTANT_NAME.fullmatch(name):
+        raise DbcError(f"{name}: a message's name has capitals, digits and single _, as in PARAMETER_SET")
+    for kind, (form, example) in _KINDS.items():
+        if (given := attribute(message, kind)) and not form.fullmatch(given):
+            raise DbcError(f"{name}: its {kind} is {given!r}; write it as in {example}")
 
 
 def _check_message(message: Message) -> None:
     name = message.name
-    if not _CONSTANT_NAME.fullmatch(name):
-        raise DbcError(f"{name}: a message's name has capitals, digits and single _, as in PARAMETER_SET")
     if message.length not in _LENGTHS:
         raise DbcError(
             f"{name} has {message.length} bytes; it may have {_LENGTHS[0]} to {_LENGTHS[-1]}, with its crc8: "
@@ -126,7 +139,7 @@ def _check_values(where: str, signal: Signal) -> None:
     if signal.choices and signal.length == 1:
         raise DbcError(f"{where} is one bit, a bool without names; remove its VAL_ rows, or give it 2 bits")
     for value, name in (signal.choices or {}).items():
-        if not _CONSTANT_NAME.fullmatch(str(name)) or str(name) in {"None", "True", "False"}:
+        if not _CONSTANT_NAME.fullmatch(str(name)):
             raise DbcError(f"{where}: VAL_ {value} {name}: a value's name has capitals, digits and single _")
         if not int(signal.minimum or 0) <= value <= int(signal.maximum or 0):
             raise DbcError(f"{where}: VAL_ {value} {name} is outside its bounds; renumber it, or widen them")
