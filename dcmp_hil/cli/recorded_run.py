@@ -12,6 +12,7 @@ from rich.text import Text
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.outputs import json_place, try_places, write_each
+from dcmp_hil.common.number_range import number
 from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
@@ -89,7 +90,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
     keys, start = given.keys(), given.figures.get("start") or 0.0
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
-        raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
+        raise ConfigError(f"--from: got {number(start)} s; the run lasts {lasted:.4g} s. Write less.")
     rig = _changed(run.rig, keys, trust=trust)
     again = reexecute(run, rig, trust=trust)
     others = {

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.config import change_rig, load_tables
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
@@ -136,8 +137,8 @@ class Given:
         period = self.file.get("period")
         if period is not None and not PERIOD_RANGE.holds(period):
             raise ConfigError(
-                f"--period: got {period:g}; expected {PERIOD_RANGE.words('s')}. Give the time from row to "
-                "row, or leave it out to take the stamps."
+                f"--period: got {number(period)}; expected {PERIOD_RANGE.words('s')}. Give the time from row "
+                "to row, or leave it out to take the stamps."
             )
         ku = any(key.partition("=")[0].strip() == _OPTION_KEYS["ku"] for key in self.keys())
         return ColumnOptions(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from dcmp_hil.common.number_range import NumberRange
+from dcmp_hil.common.number_range import NumberRange, number
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.model import Model
@@ -76,7 +76,7 @@ class ReplaySettings:
     def __post_init__(self) -> None:
         """Check every number against its range."""
         faults = [
-            f"{option}: got {value:g}; expected {allowed.words(unit)}. {remedy}"
+            f"{option}: got {number(value)}; expected {allowed.words(unit)}. {remedy}"
             for option, value, unit, allowed, remedy in self._ranges()
             if not allowed.holds(value)
         ]

@@ -11,7 +11,7 @@ import pytest
 from dcmp_hil import load_rig
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.offline import ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.helpers import named
 from tests.offline.synthetic import swing, write
 
@@ -138,3 +138,19 @@ def test_what_cannot_be_is_refused(options: tuple[str, ...], says: str, cli: Cli
     outcome = cli("replay", recording, *options, "--no-write")
     assert (outcome.code, outcome.out) == (2, "")
     assert says in outcome.err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--period", "10.000001"), ("--from", "-0.00000012345678"), ("--L1", "10000.00001")]
+)
+def test_a_number_that_is_refused_is_named_as_it_was_given(
+    cli: Cli, recording: str, option: str, value: str
+) -> None:
+    outcome = cli("replay", recording, f"{option}={value}", "--no-write")
+    assert outcome.code == 2
+    assert float(outcome.err.partition("got ")[2].partition(";")[0]) == float(value)
+
+
+def test_a_period_that_was_given_is_told_in_full(recording: str) -> None:
+    read = read_recording(Path(recording), ColumnOptions(period=0.00500000123, time="none"))
+    assert any("0.00500000123 s" in note for note in read.notes), read.notes
