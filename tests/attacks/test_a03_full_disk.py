@@ -22,7 +22,7 @@ from dcmp_hil.errors import IncompleteError
 from dcmp_hil.recording.completeness import ending_of
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.recording.write_buffer import Backlog
+from dcmp_hil.recording.write_buffer import WriteBuffer
 from dcmp_hil.recording.writer import RecordingSink
 from tests.helpers import bench
 from tests.namespaces import on_disk_of
@@ -69,11 +69,11 @@ class _Disk:
         self._full = full
         self.frees_at_the_end = False
 
-    def open(self, path: Path, room: int) -> Backlog:
-        backlog = Backlog(path, room)
-        backlog._file.close()  # noqa: SLF001
-        backlog._file = _Fickle(path, self)  # type: ignore[assignment] # noqa: SLF001
-        return backlog
+    def open(self, path: Path, room: int) -> WriteBuffer:
+        buffer = WriteBuffer(path, room)
+        buffer._file.close()  # noqa: SLF001
+        buffer._file = _Fickle(path, self)  # type: ignore[assignment] # noqa: SLF001
+        return buffer
 
     def takes(self, size: int) -> int:
         if not self.frees_at_the_end and self._chance.random() < self._full:
