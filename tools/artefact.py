@@ -52,14 +52,23 @@ def compile_boards(folder: Path, boards: Path = FOLDER) -> dict[str, dict[str, i
 def release(
     built: Path, target: Path, sizes: dict[str, dict[str, int]], boards: Path = FOLDER
 ) -> dict[str, object]:
-    """Copy what is released; return what is known of it, as it stands in `manifest.json`."""
+    """Copy what is released; return what is known of it, as it stands in `manifest.json`.
+
+    Raises
+    ------
+    RuntimeError
+        If a board.h is newer than the program that was built of it.
+    """
     target.mkdir(parents=True, exist_ok=True)
     known = {}
     for board in released(read_boards(boards)):
+        data = boards / board / "board.h"
+        if data.stat().st_mtime_ns > (built / f"{board}.elf").stat().st_mtime_ns:
+            raise RuntimeError(f"{data} was changed while it was built. Build it anew.")
         images = [target / f"{board}.{piece}" for piece in PIECES]
         for image in images:
             image.write_bytes((built / image.name).read_bytes())
-        known[board] = manifest.entry(boards / board / "board.h", images, sizes[board])
+        known[board] = manifest.entry(data, images, sizes[board])
     made: dict[str, object] = {"protocol_hash": f"0x{PROTOCOL_HASH:08x}", "boards": known}
     (target / manifest.NAME).write_text(json.dumps(made, indent=2) + "\n", "utf-8")
     return made
@@ -74,10 +83,10 @@ def main() -> int:
     folder, boards = asked.folder.resolve(), asked.boards.resolve()
     try:
         sizes = compile_boards(FIRMWARE / "build/f405", boards)
+        release(FIRMWARE / "build/f405", folder, sizes, boards)
     except RuntimeError as error:
         sys.stderr.write(f"error: {error}\n")
         return 3
-    release(FIRMWARE / "build/f405", folder, sizes, boards)
     for board, use in sizes.items():
         sys.stdout.write(
             f"{board:16}" + "".join(f"{name:>10} {used:6} B" for name, used in use.items()) + "\n"

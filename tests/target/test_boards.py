@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from typing import TYPE_CHECKING
@@ -9,10 +10,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.target.board_files import check, write_board
-from tests.target.build import FIRMWARE, build, needed
+from tests.target.build import FIRMWARE, needed
 from tests.target.rung import BOARDS, RELEASED, rung, sine
 from tests.target.static import PROGRAMS
-from tools import artefact
+from tools import artefact, manifest
 from tools.boards import FOLDER, ON_A_PC, PROTOCOL, README, read_boards
 
 if TYPE_CHECKING:
@@ -73,9 +74,18 @@ def test_board_is_one_file(tmp_path: Path) -> None:
     """A board with other pins, another crystal and less memory is its board.h: it is built, and controls."""
     boards, built = tmp_path / "boards", tmp_path / "built"
     boards.mkdir()
-    write_board(boards, _OTHER)
-    _, said = build(built, "f405", f"-DDCMP_BOARDS={boards}")
-    assert re.search(r"CODE: +\d+ B +464 KB", said)  # 512 without what is the record's
+    data = write_board(boards, _OTHER) / "board.h"
+    needed("arm-none-eabi-gcc")
+    sizes = artefact.compile_boards(built, boards)
+    assert set(sizes) == {"other"}
+    memory = (built / "other.map").read_text()
+    assert re.search(r"^CODE +0x0*800c000 +0x0*74000 ", memory, re.MULTILINE)  # 512 KiB less the record's
+    known = artefact.release(built, tmp_path / "released", sizes, boards)["boards"]
+    assert known["other"]["board_h_sha256"] == manifest.sha256(data)  # type: ignore[index]
+    manifest.check_images(data, [tmp_path / f"released/other.{piece}" for piece in artefact.PIECES], "make")
+    os.utime(data)
+    with pytest.raises(RuntimeError, match=r"other/board\.h was changed while it was built\. Build it anew"):
+        artefact.release(built, tmp_path / "released", sizes, boards)
     other = read_boards(boards)["other"]
     samples = {}
     for carrier in ("can", "cobs"):
