@@ -124,7 +124,7 @@ def test_wrong_data_are_refused_with_a_remedy(tmp_path: Path, line: str, other: 
         (144, ["PF0", "PG15"], []),
     ],
 )
-def test_every_package_bonds_the_pins_of_the_data_sheet(
+def test_every_package_bonds_its_pins_and_no_others(
     tmp_path: Path, package: int, bonded: list[str], missing: list[str]
 ) -> None:
     for pin in (*bonded, *missing):

@@ -1,6 +1,8 @@
 # What an STM32F405 can do, for the check of a board's data (cmake/boards.cmake).
 
-# Which pins each package bonds, by its number of pins: DS8626, table 7 (pin definitions; LQFP64, WLCSP90, LQFP100, LQFP144).
+# Which pins each package bonds, by its number of pins (LQFP64, WLCSP90, LQFP100, LQFP144). From modm-devices,
+# stm32f4-05_07_15_17.xml, which is made from the vendor's CubeMX data. Of the data sheet (DS8626, table 7) only the rows
+# PE2 to PE6, PC13 to PC15 and PF0 were compared: compare the others before a board depends on one of them.
 set(PACKAGES 64 90 100 144)
 set(PACKAGE_64 "^(P[A-C][0-9]+|PD2)$")
 set(PACKAGE_90 "^(P[AB][0-9]+|PC([02367-9]|1[0-5])|PD([0-24-9]|1[0-245])|PE([7-9]|1[0-5]))$")
