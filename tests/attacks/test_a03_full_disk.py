@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.cli.recording_check import kept_in, space_warning
+from dcmp_hil.cli.recording_check import check_recording, space_warning
 from dcmp_hil.errors import IncompleteError
 from dcmp_hil.recording.completeness import ending_of
 from dcmp_hil.recording.metadata import about, rig_json
@@ -117,7 +117,7 @@ def test_moments_of_a_full_disk_cost_nothing(tmp_path: Path, seed: int) -> None:
     assert read.complete
     assert read.rows.tobytes() == rows.tobytes()
     assert read.events == EVENTS
-    assert kept_in(path, len(rows), wait=False).complete
+    assert check_recording(path, len(rows), wait=False).complete
     assert not any("misses" in sentence for sentence in sink.warnings)
 
 
@@ -140,7 +140,7 @@ def test_what_a_full_disk_costs_is_told_with_its_time(tmp_path: Path, seed: int)
     for (start, stop, _), gap in zip(ending.missing, read.gaps, strict=True):
         assert any(f"{start:.6g} s to {stop:.6g} s" in sentence for sentence in told) or len(told) > 1
         assert gap.start is None or gap.start <= start
-    kept = kept_in(path, len(rows), wait=False)
+    kept = check_recording(path, len(rows), wait=False)
     assert not kept.complete
     assert kept.periods == len(there)
 
