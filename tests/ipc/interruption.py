@@ -52,6 +52,7 @@ def is_interrupted(start: Callable[[], object], step: int, module: ModuleType, k
         return trace
 
     before = sys.gettrace()
+    sys._getframe().f_trace_opcodes = kind == "opcode"  # noqa: SLF001 - Python 3.12 asks this when tracing begins
     sys.settrace(trace)
     try:
         start()
