@@ -163,8 +163,8 @@ def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
             trajectory.hold(estimate.position)
         if supervisor.engages(sample):
             trajectory.begin(t, estimate.position)
-        ahead = predictor.ahead(sample, estimate)
         reference = supervisor.limit_reference(sample, trajectory.at(t + delay))
+        ahead = predictor.ahead(sample, estimate, reference)
         demand = controller.update(reference, ahead)
         voltage = supervisor.safe_voltage(sample, estimate, demand)
         backend.write(voltage)

@@ -22,6 +22,7 @@ BACKENDS = (
 )
 OBSERVERS = (
     "dcmp_hil.control.observers.super_twisting:SuperTwistingSettings",
+    "dcmp_hil.control.observers.friction_kalman.settings:FrictionKalmanSettings",
     "dcmp_hil.control.observers.paper:PaperSettings",
 )
 CONTROLLERS = (

@@ -9,6 +9,7 @@ from dcmp_hil.common.section import Section
 
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import Observer, ObserverContext
+    from dcmp_hil.control.predictor import Predictor
 
 
 class ObserverLimits(NamedTuple):
@@ -32,6 +33,27 @@ class ObserverSettings(Section, ABC):
     @abstractmethod
     def build(self, context: ObserverContext) -> Observer:
         """Make the observer for a rig."""
+
+    def predictor(
+        self,
+        observer: Observer,  # noqa: ARG002
+        context: ObserverContext,  # noqa: ARG002
+        delay_samples: int,  # noqa: ARG002
+        *,
+        measured: bool,  # noqa: ARG002
+    ) -> Predictor | None:
+        """Return the observer's own predictor; None where `LinearPredictor` serves it.
+
+        Parameters
+        ----------
+        observer
+            As `build` returned it.
+        context
+            The rig served.
+        delay_samples, measured
+            As for `LinearPredictor`.
+        """
+        return None
 
     @classmethod
     def tunable(cls) -> tuple[str, ...]:
