@@ -52,7 +52,10 @@ def test_predictor_changes_nothing_when_the_command_acts_at_once() -> None:
 
 
 def test_predictor_starts_from_the_encoder_when_measured() -> None:
-    assert LinearPredictor(Model(), 1e-3, 0, measured=True).ahead(_SAMPLE, _ESTIMATE, _REFERENCE).position == 0.31
+    assert (
+        LinearPredictor(Model(), 1e-3, 0, measured=True).ahead(_SAMPLE, _ESTIMATE, _REFERENCE).position
+        == 0.31
+    )
     carried = LinearPredictor(Model(), 1e-3, 1, measured=True).ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
     quiet = LinearPredictor(Model(), 1e-3, 1).ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
     assert carried.position - quiet.position == pytest.approx(0.01, rel=1e-12, abs=0)

@@ -16,10 +16,11 @@ from dcmp_hil.control.observers.friction_kalman.covariance import (
 )
 from dcmp_hil.control.observers.friction_kalman.motion import moved
 from dcmp_hil.control.observers.friction_kalman.trust import (
-    FAST_WEIGHT,
-    Trust,
+    BELIEVED,
     calmed,
+    halved,
     judged,
+    stepped,
 )
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.values import Estimate, Sample
@@ -27,13 +28,17 @@ from dcmp_hil.values import Estimate, Sample
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
 
-_SLOPE_NOISE, _FRICTION_NOISE, _SLOPE_START = 5.0, 1e-3, 3.0  # (rad/s3)2/s; (rad/s2)2/s; rad/s3
+State = tuple[float, float, float, float, float]
+"""x1 (rad), x2 (rad/s), d without gravity and friction, Coulomb level f (rad/s2), slope s of d (rad/s3)."""
+
+_VELOCITY_VARIANCE, _DISTURBANCE_VARIANCE, _SLOPE_DEVIATION = 1e-8, 1.0, 3.0  # at the start
+_SLOPE_NOISE, _FRICTION_NOISE = 5.0, 1e-3  # (rad/s3)2/s; (rad/s2)2/s
 _REVERSAL_NOISE, _REVERSAL_RAD_S = 1.0, 0.06  # (rad/s2)2/s, more of d below so many rad/s
 _UNCHANGED_COUNTS = 0.35  # standard deviation of an unchanged count, counts
 _FRICTION_MAX_RATIO = 4.0  # of the model's
 _RELEASE_GATE = 9.0  # variances: an edge this far off releases an arm that sticks
 _STEP_AGE_S, _STEP_DEVIATION_MAX = 0.025, 300.0  # s; rad/s2
-_STEP_MEAN_MIN, _STEP_CALM_MAX, _STEP_SPEED_MIN = 30.0, 2.5, 0.1  # chi^2; mean of m; rad/s
+_STEP_CALM_MAX, _STEP_SPEED_MIN_RAD_S = 2.5, 0.1  # mean of m
 
 
 class Tuning(NamedTuple):
@@ -41,16 +46,6 @@ class Tuning(NamedTuple):
 
     d_noise: float  # (rad/s2)2/s
     edge_counts: float  # counts
-
-
-class State(NamedTuple):
-    """The state of the filter."""
-
-    x1: float  # rad
-    x2: float  # rad/s
-    d: float  # rad/s2, disturbance without gravity and friction
-    f: float  # rad/s2, Coulomb friction
-    s: float  # rad/s3, slope of d
 
 
 class FrictionKalman:
@@ -100,16 +95,21 @@ class FrictionKalman:
                 "friction_kalman measures by the edges of an encoder, and this one is ideal. Set "
                 'encoder.counts_per_rev, or use observer.kind = "super_twisting".'
             )
-        self._q = q = 2.0 * math.pi / context.counts_per_rev
+        self._q = 2.0 * math.pi / context.counts_per_rev
+        self._half_count = 0.5 * self._q
         model = context.model
         self._f0, self._gravity, self._ku, self._f1 = model.f0, model.gravity, model.ku, model.f1
         self._f_max = _FRICTION_MAX_RATIO * model.f1
         self._f1_variance = f1_uncertainty * f1_uncertainty
         self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
-        self._unchanged_variance = (_UNCHANGED_COUNTS * q) ** 2
+        self._unchanged_variance = (_UNCHANGED_COUNTS * self._q) ** 2
         self.retune(Tuning(d_noise, edge_counts))
-        self._t = math.nan
-        self._begin(math.nan, math.nan)
+        self._t = self._y = self._first = self._edge_t = math.nan
+        self._count = self.steps = 0
+        self.sticks = False
+        self.trust = BELIEVED
+        self.state: State = (math.nan, math.nan, math.nan, self._f1, 0.0)
+        self.covariance: Covariance = (math.nan,) * 5 + (math.nan,) * 10
 
     def retune(self, tuning: Tuning) -> None:
         """Change the noises; the state stays."""
@@ -126,17 +126,13 @@ class FrictionKalman:
         """
         t, y, voltage, _ = sample
         step = t - self._t
-        if step <= 0.0:
-            raise standing_still(self._t, t)
-        if not step <= self._restart_after:  # NaN: the first sample
+        if not 0.0 < step <= self._restart_after:
             return self._begin(t, y)
-        self._t = t
-        u = self._ku * voltage
-        f0, gravity = self._f0, self._gravity
+        u, f0, gravity = self._ku * voltage, self._f0, self._gravity
         x1, x2, d, f, s = self.state
         x1, x2, d, s, a, direction = moved(x1, x2, d, f, s, step, u, f0, gravity)
-        believed = self.trust
-        m, slope_m, calm, _, _, scatter = believed
+
+        m, slope_m, _, _, _, scatter = trust = self.trust
         d_noise, f_noise = self._d_noise * step * m, _FRICTION_NOISE * step
         if -_REVERSAL_RAD_S < x2 < _REVERSAL_RAD_S:
             d_noise, f_noise = d_noise + _REVERSAL_NOISE * step, f_noise * (30.0 * m - 29.0)
@@ -146,86 +142,105 @@ class FrictionKalman:
         else:
             p = stuck(self.covariance, step, noise)
 
-        # Measure: the newest edge, if the count changed; else only how far the arm is outside of its count.
-        q = self._q
-        self._since_edge += step
-        count = round((y - self._first) / q)
-        edge = count != self._count
-        e = h = 0.0
-        if edge:
-            speed = abs(x2)
-            span = q / speed if speed * step > q else step
-            passed = y - 0.5 * q if count > self._count else y + 0.5 * q
-            e, h = passed - (x1 - 0.5 * span * x2), -0.5 * span
-            r = scatter * self._edge_variance + (x2 * span) ** 2 / 12.0
-            if not direction and e * e > _RELEASE_GATE * (p[0] + r):
-                d = f - (a - d) if e > 0.0 else -f - (a - d)
-                x2 = 0.5 * e / max(self._since_edge, 2.0 * step)
-                p, direction = released(p, e, x2, f), 1.0
-            self._count, self._since_edge = count, 0.0
+        off, reach = y - x1, self._half_count
+        rise = self._rise(y) if y != self._y else 0
+        self._t, self._y, self.sticks = t, y, not direction
+        if rise:
+            x = self._by_edge((x1, x2, d, f, s), p, a, rise, step)
+        elif off > reach or off < -reach:
+            e, r = off - math.copysign(reach, off), scatter * self._unchanged_variance
+            x = self._corrected((x1, x2, d, f, s), p, (e, 0.0, r), step, False)
         else:
-            r = scatter * self._unchanged_variance
-            if y - x1 > 0.5 * q:
-                e = y - x1 - 0.5 * q
-            elif y - x1 < -0.5 * q:
-                e = y - x1 + 0.5 * q
+            x, self.covariance, self.trust = (x1, x2, d, f, s), p, calmed(trust, step)
 
-        if edge or e:
-            # Judge.
-            p00, p01, p02, p03, p04, p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
-            variance = p00 + h * (2.0 * p01 + h * p11) + r
-            nu = e / math.sqrt(variance)
-            trust = judged(believed, nu, step, edge=edge)
-            fast = trust[4]
-            if (
-                FAST_WEIGHT * fast * fast > _STEP_MEAN_MIN
-                and nu * fast > 0.0
-                and nu * nu > 1.0
-                and abs(x2) >= _STEP_SPEED_MIN
-                and calm < _STEP_CALM_MAX
-            ):
-                p, trust = _stepped(p, e, h, variance), trust._replace(fast=0.5 * fast)
-                p00, p01, p02, p03, p04, p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
-                variance = p00 + h * (2.0 * p01 + h * p11) + r
-                self.steps += 1
-
-            # Correct.
-            h0, h1, h2, h3, h4 = p00 + h * p01, p01 + h * p11, p02 + h * p12, p03 + h * p13, p04 + h * p14
-            k0, k1, k2, k3, k4 = h0 / variance, h1 / variance, h2 / variance, h3 / variance, h4 / variance
-            # fmt: off
-            p = (
-                p00 - k0 * h0, p01 - k0 * h1, p02 - k0 * h2, p03 - k0 * h3, p04 - k0 * h4,
-                p11 - k1 * h1, p12 - k1 * h2, p13 - k1 * h3, p14 - k1 * h4,
-                p22 - k2 * h2, p23 - k2 * h3, p24 - k2 * h4, p33 - k3 * h3, p34 - k3 * h4, p44 - k4 * h4,
-            )
-            # fmt: on
-            x1, x2, d, f, s = x1 + k0 * e, x2 + k1 * e, d + k2 * e, f + k3 * e, s + k4 * e
-            f = 0.0 if f < 0.0 else min(self._f_max, f)
-        else:
-            trust = calmed(believed, step)
-
-        # Report.
-        self.state, self.covariance, self.trust = make(State, (x1, x2, d, f, s)), p, trust
-        self.sticks = not direction
+        self.state = x1, x2, d, f, s = x
         w = d - gravity * math.sin(x1) - (f if x2 > 0.0 else -f) if x2 else -u
         return make(Estimate, (x1, x2, w))
 
     def _begin(self, t: float, y: float) -> Estimate:
         """Begin at rest where the arm is, as if nothing had been seen before."""
+        if t <= self._t:
+            raise standing_still(self._t, t)
         q = self._q
-        self._t, self._first = t, y
-        self._count, self._since_edge = 0, 0.0
-        self.state = State(y, 0.0, 0.0, self._f1, 0.0)
-        start = (q * q / 12.0, 1e-8, 1.0, self._f1_variance, _SLOPE_START**2)
-        self.covariance: Covariance = (
-            *(start[0], 0.0, 0.0, 0.0, 0.0, start[1], 0.0, 0.0, 0.0),
-            *(start[2], 0.0, 0.0, start[3], 0.0, start[4]),
+        self._t, self._y, self._first = t, y, y
+        self._count, self._edge_t = 0, t
+        self.state = y, 0.0, 0.0, self._f1, 0.0
+        # fmt: off
+        self.covariance = (
+            q * q / 12.0, 0.0, 0.0, 0.0, 0.0,
+            _VELOCITY_VARIANCE, 0.0, 0.0, 0.0,
+            _DISTURBANCE_VARIANCE, 0.0, 0.0,
+            self._f1_variance, 0.0, _SLOPE_DEVIATION**2,
         )
-        self.trust, self.sticks, self.steps = Trust(), False, 0
+        # fmt: on
+        self.trust, self.sticks, self.steps = BELIEVED, False, 0
         return Estimate(y, 0.0, 0.0)
 
+    def _rise(self, y: float) -> int:
+        """Take the count at `y`, rad, and return by how many it rose."""
+        count = round((y - self._first) / self._q)
+        rise, self._count = count - self._count, count
+        return rise
 
-def _stepped(p: Covariance, e: float, h: float, variance: float) -> Covariance:
+    def _by_edge(self, x: State, p: Covariance, a: float, rise: int, step: float) -> State:
+        """Measure by the newest edge that was passed; an arm that stuck is released by it."""
+        x1, x2, d, f, s = x
+        q, speed = self._q, abs(x2)
+        span = q / speed if speed * step > q else step
+        passed = self._y - math.copysign(self._half_count, rise)
+        e, h = passed - x1 + 0.5 * span * x2, -0.5 * span
+        r = self.trust[5] * self._edge_variance + (x2 * span) ** 2 / 12.0
+        since, self._edge_t = self._t - self._edge_t, self._t
+        if self.sticks and e * e > _RELEASE_GATE * (p[0] + r):
+            self.sticks = False
+            d = math.copysign(f, e) - (a - d)
+            x2 = 0.5 * e / max(since, 2.0 * step)
+            p = released(p, e, x2, f)
+        return self._corrected((x1, x2, d, f, s), p, (e, h, r), step, True)
+
+    def _corrected(
+        self, x: State, p: Covariance, measured: tuple[float, float, float], step: float, edge: bool
+    ) -> State:
+        """Judge an innovation, and correct by it.
+
+        Parameters
+        ----------
+        x, p
+            As predicted.
+        measured
+            The innovation e, rad; H = (1, h, 0, 0, 0), h in s; its variance R, rad2.
+        step
+            s.
+        edge
+            Whether the count changed.
+        """
+        e, h, r = measured
+        variance = p[0] + h * (2.0 * p[1] + h * p[5]) + r
+        nu = e / math.sqrt(variance)
+        trust = judged(self.trust, nu, step, edge)
+        x1, x2, d, f, s = x
+        if stepped(trust[4], nu) and self.trust[2] < _STEP_CALM_MAX and abs(x2) >= _STEP_SPEED_MIN_RAD_S:
+            p, trust = _explained(p, e, h, variance), halved(trust)
+            variance = p[0] + h * (2.0 * p[1] + h * p[5]) + r
+            self.steps += 1
+        p00, p01, p02, p03, p04, p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
+        h0, h1, h2, h3, h4 = p00 + h * p01, p01 + h * p11, p02 + h * p12, p03 + h * p13, p04 + h * p14
+        k0, k1, k2, k3, k4 = h0 / variance, h1 / variance, h2 / variance, h3 / variance, h4 / variance
+        self.trust = trust
+        # fmt: off
+        self.covariance = (
+            p00 - k0 * h0, p01 - k0 * h1, p02 - k0 * h2, p03 - k0 * h3, p04 - k0 * h4,
+            p11 - k1 * h1, p12 - k1 * h2, p13 - k1 * h3, p14 - k1 * h4,
+            p22 - k2 * h2, p23 - k2 * h3, p24 - k2 * h4, p33 - k3 * h3, p34 - k3 * h4, p44 - k4 * h4,
+        )
+        # fmt: on
+        f += k3 * e
+        if not 0.0 <= f <= self._f_max:
+            f = max(0.0, min(f, self._f_max))
+        return x1 + k0 * e, x2 + k1 * e, d + k2 * e, f, s + k4 * e
+
+
+def _explained(p: Covariance, e: float, h: float, variance: float) -> Covariance:
     """Return P so wide that a step of the disturbance, a while ago, explains the innovation `e`."""
     half = 0.5 * _STEP_AGE_S * _STEP_AGE_S
     seen = max(half + h * _STEP_AGE_S, 0.5 * half)

@@ -1,39 +1,33 @@
-"""How far the innovations let the model be trusted, and the noise that is assumed because of it."""
+"""How far the innovations let the model be trusted, and the noise that is assumed because of it.
+
+A lag shows as innovations of one sign long before any one of them is large: so the trigger is a signed mean,
+and not the size of the innovations.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-from dcmp_hil.common.fast_tuple import make
+Trust = tuple[float, float, float, float, float, float]
+"""m, the inflation of the disturbance's noise, 1 while the model is believed; that of its slope's noise; the
+mean of m over 0.3 s; a slow and a fast mean of the innovations over their deviation; the inflation of the
+encoder's noise."""
+
+BELIEVED: Trust = (1.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+"""At the start."""
 
 _SLOW_RATE, _FAST_RATE = 0.04, 0.2  # of a mean, per innovation
-_SLOW_WEIGHT, FAST_WEIGHT = 49.0, 9.0
-"""(2 - r)/r for both rates: so much times the mean's square is chi^2(1) for white innovations."""
+_SLOW_WEIGHT, _FAST_WEIGHT = 49.0, 9.0  # (2 - r)/r: with it the square of a mean is chi^2(1) for white ones
 _CLIP = 4.0  # standard deviations
-_DECAY_S = 0.04  # s, of the inflation
+_DECAY_S = 0.04  # s, of m
 _INFLATION_MAX, _SLOPE_INFLATION_MAX = 300.0, 100.0
-_CALM_S, _CALM_STEP_MAX = 0.3, 50.0  # s of the mean that tells a calm; what one step may add to it
+_CALM_S, _CALM_STEP_MAX = 0.3, 50.0  # s; by how much m counts above its mean
 _SCATTER_RATE, _SCATTER_MEAN, _SCATTER_MAX = 0.02, 1.5, 30.0
 _SCATTER_CLIP, _SCATTER_INFLATION_MAX = 9.0, 10.0
+_STEP_CHI2 = 30.0
 
 
-class Trust(NamedTuple):
-    """What is remembered of the innovations.
-
-    A lag shows as innovations of one sign long before any one of them is large: so the trigger is a signed
-    mean, and not the size of the innovations.
-    """
-
-    m: float = 1.0  # inflation of the disturbance's noise; 1 while the model is believed
-    slope_m: float = 1.0  # of its slope's noise
-    calm: float = 0.0  # mean of m over 0.3 s
-    slow: float = 0.0  # means of the normalised innovations
-    fast: float = 0.0
-    scatter: float = 1.0  # inflation of the encoder's noise
-
-
-def judged(trust: Trust, nu: float, step: float, *, edge: bool) -> Trust:
+def judged(trust: Trust, nu: float, step: float, edge: bool) -> Trust:
     """Return the trust at the end of a step with an innovation.
 
     Parameters
@@ -50,24 +44,23 @@ def judged(trust: Trust, nu: float, step: float, *, edge: bool) -> Trust:
     m, _, calm, slow, fast, scatter = trust
     square = nu * nu
     if edge and m < _SCATTER_INFLATION_MAX:
-        scatter *= 1.0 + _SCATTER_RATE * (
-            (min(_SCATTER_CLIP, square)) - _SCATTER_MEAN
-        )
-        scatter = 1.0 if scatter < 1.0 else min(_SCATTER_MAX, scatter)
+        grown = scatter * (1.0 + _SCATTER_RATE * (min(square, _SCATTER_CLIP) - _SCATTER_MEAN))
+        scatter = grown if 1.0 <= grown <= _SCATTER_MAX else max(1.0, min(grown, _SCATTER_MAX))
     if square > _CLIP * _CLIP:
         nu = math.copysign(_CLIP, nu)
     slow += _SLOW_RATE * (nu - slow)
     fast += _FAST_RATE * (nu - fast)
     z = 0.5 * _SLOW_WEIGHT * slow * slow
-    target = z * z if z > 1.0 else 1.0
+    target = slope_m = 1.0
+    if z > 1.0:
+        target = z * z
+        slope_m = min(target, _SLOPE_INFLATION_MAX)
     if target > m:
-        m = min(_INFLATION_MAX, target)
-    elif target != m:
+        m = min(target, _INFLATION_MAX)
+    elif m != 1.0:
         m = target + (m - target) * math.exp(-step / _DECAY_S)
-    slope_m = min(_SLOPE_INFLATION_MAX, target)
-    rise = m - calm
-    calm += (min(_CALM_STEP_MAX, rise)) * step / _CALM_S
-    return make(Trust, (m, slope_m, calm, slow, fast, scatter))
+    calm += (m - calm if m < calm + _CALM_STEP_MAX else _CALM_STEP_MAX) * step / _CALM_S
+    return m, slope_m, calm, slow, fast, scatter
 
 
 def calmed(trust: Trust, step: float) -> Trust:
@@ -75,6 +68,22 @@ def calmed(trust: Trust, step: float) -> Trust:
     m, slope_m, calm, slow, fast, scatter = trust
     if m != 1.0:
         m = 1.0 + (m - 1.0) * math.exp(-step / _DECAY_S)
-    rise = m - calm
-    calm += (min(_CALM_STEP_MAX, rise)) * step / _CALM_S
-    return make(Trust, (m, slope_m, calm, slow, fast, scatter))
+    return (
+        m,
+        slope_m,
+        calm + (m - calm if m < calm + _CALM_STEP_MAX else _CALM_STEP_MAX) * step / _CALM_S,
+        slow,
+        fast,
+        scatter,
+    )
+
+
+def stepped(fast: float, nu: float) -> bool:
+    """Return whether the innovations of late are large enough, and of the same sign as `nu`, for a step."""
+    return _FAST_WEIGHT * fast * fast > _STEP_CHI2 and nu * fast > 0.0 and nu * nu > 1.0
+
+
+def halved(trust: Trust) -> Trust:
+    """Return the trust after a step was assumed, which explains half of the fast mean."""
+    m, slope_m, calm, slow, fast, scatter = trust
+    return m, slope_m, calm, slow, 0.5 * fast, scatter
