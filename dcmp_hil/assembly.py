@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.control.controllers import Controller
-    from dcmp_hil.control.observers import Observer
-    from dcmp_hil.control.predictor import Predictor
+    from dcmp_hil.control.observers import Observer, Predictor
     from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import Truth
+from sim_backend.detailed_plant import DetailedPlant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -117,6 +118,8 @@ def make_plant(rig: Rig) -> Plant:
     """Make the plant that a rig's `[sim]` and `[model]` describe."""
     kinds: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
     steps = rig.plant_steps
-    return kinds[rig.sim.integrator](
-        rig.plant, rig.model.values(), position=rig.sim.position_rad, step=rig.period / steps, steps=steps
-    )
+    place = {"position": rig.sim.position_rad, "step": rig.period / steps}
+    details = rig.sim.details
+    if details is not None:
+        return DetailedPlant(rig.plant, rig.model.values(), details, **place, steps=steps)
+    return kinds[rig.sim.integrator](rig.plant, rig.model.values(), **place, steps=steps)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.values import Estimate
@@ -14,21 +14,6 @@ if TYPE_CHECKING:
 
 
 _NEGLIGIBLE_F0_PERIOD, _SERIES_F0_PERIOD_MAX = 1e-17, 1e-2  # of f0 T; below the first, 1 - f0 T is 1
-
-
-class Predictor(Protocol):
-    """Protocol of a predictor: from the estimate at a sample to the state at which its command acts."""
-
-    def ahead(self, sample: Sample, estimate: Estimate, reference: Reference, /) -> Estimate:
-        """Return the state at the instant of `reference`, at which the next command takes effect.
-
-        Its disturbance is the one to compensate there.
-        """
-        ...
-
-    def sent(self, voltage: float, /) -> None:
-        """Remember what was just sent, V: it is under way until the next sample."""
-        ...
 
 
 class LinearPredictor:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import UNKNOWN_TRUTH
@@ -249,8 +251,66 @@ class Shove(PlantFault):
         return volts + self._volts
 
 
+class Torque(PlantFault):
+    """A torque acts on the arm; its course in time is the derived class's."""
+
+    _age = -1
+
+    def begin(self) -> None:
+        """Begin its time."""
+        self._age = -1
+
+    def voltage(self, volts: float) -> float:
+        """Return the voltage plus the equivalent of the torque, V."""
+        self._age += 1
+        return volts + self.course(self._age * self.facts.period) * self.number("rad_s2") / self.facts.ku
+
+    @abstractmethod
+    def course(self, t: float) -> float:
+        """Return the torque `t` s after its begin, relative to its amplitude."""
+
+
+class Push(Torque):
+    """A hand pushes the arm once: half a sine."""
+
+    def course(self, t: float) -> float:
+        """Return half a sine of `ms`."""
+        length = 1e-3 * self.number("ms")
+        return math.sin(math.pi * t / length) if t < length else 0.0
+
+
+class Sway(Torque):
+    """A hand moves the arm to and fro."""
+
+    def course(self, t: float) -> float:
+        """Return a sine of `hz`."""
+        return math.sin(math.tau * self.number("hz") * t)
+
+
+class Square(Torque):
+    """A torque that changes its sign."""
+
+    def course(self, t: float) -> float:
+        """Return the sign of a sine of `hz`."""
+        return math.copysign(1.0, math.sin(math.tau * self.number("hz") * t))
+
+
+class UnknownDelay(PlantFault):
+    """The motor sees a voltage some periods after the reported instant."""
+
+    def begin(self) -> None:
+        """Begin with 0 V under way."""
+        self._under_way = deque([0.0] * round(self.number("periods")))
+
+    def voltage(self, volts: float) -> float:
+        """Return the voltage of `periods` periods ago, V."""
+        self._under_way.append(volts)
+        return self._under_way.popleft()
+
+
 _COUNTS = Number("counts", -1e6, 1e6, 1000)
 _REPETITION_PARAMETERS = {"times": Number("", 1, 1e6, 1), "every": Number("periods", 1, 1e6, 3)}
+_TORQUE_PARAMETER = {"rad_s2": Number("rad/s2", -1e5, 1e5, 8)}
 _VOLTAGE_PARAMETER = {"V": Number("V", 0, 100, 1)}
 PLANT = {
     "plant.enc_stuck": Kind(Stuck, "the encoder shows one position for ever"),
@@ -268,6 +328,20 @@ PLANT = {
     "plant.saturation": Kind(Saturation, "the amplifier gives no more than this", _VOLTAGE_PARAMETER),
     "plant.offset": Kind(Offset, "the amplifier adds a voltage", {"V": Number("V", -100, 100, 1)}),
     "plant.dead_band": Kind(DeadBand, "the amplifier gives nothing below this", _VOLTAGE_PARAMETER),
+    "plant.delay": Kind(
+        UnknownDelay, "the motor sees a voltage later than it is reported", {"periods": Number("", 1, 100, 2)}
+    ),
+    "plant.push": Kind(
+        Push,
+        "a hand pushes the arm: half a sine",
+        {**_TORQUE_PARAMETER, "ms": Number("ms", 1, 1e5, 300)},
+    ),
+    "plant.sway": Kind(
+        Sway, "a hand moves the arm to and fro", {**_TORQUE_PARAMETER, "hz": Number("Hz", 1e-3, 1e3, 0.3)}
+    ),
+    "plant.square": Kind(
+        Square, "a torque changes its sign", {**_TORQUE_PARAMETER, "hz": Number("Hz", 1e-3, 1e3, 0.4)}
+    ),
     "plant.shove": Kind(
         Shove,
         "the arm is pushed",

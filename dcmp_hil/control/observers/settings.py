@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil.common.section import Section
 
 if TYPE_CHECKING:
-    from dcmp_hil.control.observers import Observer, ObserverContext
-    from dcmp_hil.control.predictor import Predictor
+    from dcmp_hil.control.observers import Observer, ObserverContext, Predictor
 
 
 class ObserverLimits(NamedTuple):
@@ -67,6 +66,11 @@ class ObserverSettings(Section, ABC):
     def by_rule(self, name: str, context: ObserverContext) -> float | None:  # noqa: ARG002
         """Return what the rule makes of a key that was left out; None where there is no rule."""
         return None
+
+    @property
+    def knows_friction(self) -> bool:
+        """Whether the friction of `[model]` is part of the observer's own prediction."""
+        return False
 
     def warning(self, context: ObserverContext) -> str:  # noqa: ARG002
         """Return a warning of settings that are valid and rarely intended; empty without one."""

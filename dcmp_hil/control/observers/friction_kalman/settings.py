@@ -10,9 +10,8 @@ from dcmp_hil.control.observers.friction_kalman.predictor import FrictionPredict
 from dcmp_hil.control.observers.settings import ObserverSettings
 
 if TYPE_CHECKING:
-    from dcmp_hil.control.observers import Observer, ObserverContext
+    from dcmp_hil.control.observers import Observer, ObserverContext, Predictor
     from dcmp_hil.control.observers.settings import ObserverLimits
-    from dcmp_hil.control.predictor import Predictor
 
 
 class FrictionKalmanSettings(ObserverSettings):
@@ -41,6 +40,11 @@ class FrictionKalmanSettings(ObserverSettings):
         """Make the predictor that goes on from the filter's state."""
         assert isinstance(observer, FrictionKalman)  # noqa: S101
         return FrictionPredictor(observer, context, delay_samples, measured=measured)
+
+    @property
+    def knows_friction(self) -> bool:
+        """Whether the friction of `[model]` is part of the observer's own prediction."""
+        return True
 
     @classmethod
     def tunable(cls) -> tuple[str, ...]:
