@@ -1,4 +1,4 @@
-"""The pendulum with what a real motor has besides: Stribeck friction, soft friction, cogging."""
+"""The pendulum with properties of a real motor: Stribeck friction, soft friction, cogging."""
 
 from __future__ import annotations
 

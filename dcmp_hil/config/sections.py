@@ -142,7 +142,7 @@ class SimSection(Section):
 
     @property
     def details(self) -> PlantDetails | None:
-        """What the simulated motor has besides the model; None if nothing."""
+        """Properties of the simulated motor beyond the model; None without any."""
         if not (self.stribeck_ratio or self.bristle_mrad or self.cogging_rad_s2):
             return None
         return PlantDetails(

@@ -37,7 +37,7 @@ class Model(NamedTuple):
 
 
 class PlantDetails(NamedTuple):
-    """What a simulated motor has besides the model."""
+    """Properties of a simulated motor beyond the model."""
 
     stribeck_ratio: float  # friction at rest over that in motion, minus 1
     stribeck: float  # rad/s

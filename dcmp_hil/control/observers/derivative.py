@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
 
 
-class Tuning(NamedTuple):
+class DerivativeTuning(NamedTuple):
     """The key that may change in a run."""
 
     bandwidth: float  # rad/s
@@ -36,9 +36,9 @@ class DerivativeSettings(ObserverSettings):
         """Return the keys that may change in a run."""
         return ("bandwidth_rad_s",)
 
-    def tuning(self, context: ObserverContext) -> Tuning:  # noqa: ARG002
+    def tuning(self, context: ObserverContext) -> DerivativeTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
-        return Tuning(self.bandwidth_rad_s)
+        return DerivativeTuning(self.bandwidth_rad_s)
 
 
 class Derivative:
@@ -66,7 +66,7 @@ class Derivative:
         self._t = self._y = math.nan
         self._v = self._u = self._w = 0.0
 
-    def retune(self, tuning: Tuning) -> None:
+    def retune(self, tuning: DerivativeTuning) -> None:
         """Change the bandwidth; the estimates stay."""
         self._bandwidth = tuning.bandwidth
 

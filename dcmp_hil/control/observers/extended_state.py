@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
 
 
-class Tuning(NamedTuple):
+class ExtendedStateTuning(NamedTuple):
     """The key that may change in a run."""
 
     bandwidth: float  # rad/s
@@ -36,9 +36,9 @@ class ExtendedStateSettings(ObserverSettings):
         """Return the keys that may change in a run."""
         return ("bandwidth_rad_s",)
 
-    def tuning(self, context: ObserverContext) -> Tuning:  # noqa: ARG002
+    def tuning(self, context: ObserverContext) -> ExtendedStateTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
-        return Tuning(self.bandwidth_rad_s)
+        return ExtendedStateTuning(self.bandwidth_rad_s)
 
 
 class ExtendedState:
@@ -66,7 +66,7 @@ class ExtendedState:
         self._t = math.nan
         self._x1 = self._x2 = self._w = 0.0
 
-    def retune(self, tuning: Tuning) -> None:
+    def retune(self, tuning: ExtendedStateTuning) -> None:
         """Change the bandwidth; the estimates stay."""
         self._bandwidth = tuning.bandwidth
 

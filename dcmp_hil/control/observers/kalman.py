@@ -18,7 +18,7 @@ _COUNT_VARIANCE = 1.0 / 12.0  # counts^2, of a value that lies anywhere in its c
 _VELOCITY_VARIANCE, _DISTURBANCE_VARIANCE = 1e-8, 100.0  # (rad/s)2, (rad/s2)2; at rest at the start
 
 
-class Tuning(NamedTuple):
+class KalmanTuning(NamedTuple):
     """The key that may change in a run."""
 
     w_noise: float  # (rad/s2)2/s
@@ -40,9 +40,9 @@ class KalmanSettings(ObserverSettings):
         """Return the keys that may change in a run."""
         return ("w_noise",)
 
-    def tuning(self, context: ObserverContext) -> Tuning:  # noqa: ARG002
+    def tuning(self, context: ObserverContext) -> KalmanTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
-        return Tuning(self.w_noise)
+        return KalmanTuning(self.w_noise)
 
     def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:  # noqa: ARG002
         """Return a fault on an ideal encoder, whose noise is 0."""
@@ -80,7 +80,7 @@ class Kalman:
         self._state = (0.0, 0.0, 0.0)
         self._p = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # P00 P01 P02 P11 P12 P22
 
-    def retune(self, tuning: Tuning) -> None:
+    def retune(self, tuning: KalmanTuning) -> None:
         """Change the noise; the state stays."""
         self._w_noise = tuning.w_noise
 

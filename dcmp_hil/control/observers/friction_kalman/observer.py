@@ -41,7 +41,7 @@ _STEP_AGE_S, _STEP_DEVIATION_MAX = 0.025, 300.0  # s; rad/s2
 _STEP_CALM_MAX, _STEP_SPEED_MIN_RAD_S = 2.5, 0.1  # mean of m
 
 
-class Tuning(NamedTuple):
+class FrictionKalmanTuning(NamedTuple):
     """The keys that may change in a run."""
 
     d_noise: float  # (rad/s2)2/s
@@ -103,7 +103,7 @@ class FrictionKalman:
         self._f1_variance = f1_uncertainty * f1_uncertainty
         self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
         self._unchanged_variance = (_UNCHANGED_COUNTS * self._q) ** 2
-        self.retune(Tuning(d_noise, edge_counts))
+        self.retune(FrictionKalmanTuning(d_noise, edge_counts))
         self._t = self._y = self._first = self._edge_t = math.nan
         self._count = self.steps = 0
         self.sticks = False
@@ -111,7 +111,7 @@ class FrictionKalman:
         self.state: State = (math.nan, math.nan, math.nan, self._f1, 0.0)
         self.covariance: Covariance = (math.nan,) * 5 + (math.nan,) * 10
 
-    def retune(self, tuning: Tuning) -> None:
+    def retune(self, tuning: FrictionKalmanTuning) -> None:
         """Change the noises; the state stays."""
         self._d_noise = tuning.d_noise
         self._edge_variance = (tuning.edge_counts * self._q) ** 2

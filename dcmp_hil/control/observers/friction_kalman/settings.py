@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.observers.friction_kalman.observer import FrictionKalman, Tuning
+from dcmp_hil.control.observers.friction_kalman.observer import FrictionKalman, FrictionKalmanTuning
 from dcmp_hil.control.observers.friction_kalman.predictor import FrictionPredictor
 from dcmp_hil.control.observers.settings import ObserverSettings
 
@@ -51,9 +51,9 @@ class FrictionKalmanSettings(ObserverSettings):
         """Return the keys that may change in a run; `f1_uncertainty` acts at the start only."""
         return ("d_noise", "edge_counts")
 
-    def tuning(self, context: ObserverContext) -> Tuning:  # noqa: ARG002
+    def tuning(self, context: ObserverContext) -> FrictionKalmanTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
-        return Tuning(self.d_noise, self.edge_counts)
+        return FrictionKalmanTuning(self.d_noise, self.edge_counts)
 
     def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:  # noqa: ARG002
         """Return a fault on an ideal encoder, which has no edges."""

@@ -1,4 +1,4 @@
-"""How far the innovations let the model be trusted, and the noise that is assumed because of it.
+"""Trust in the model by its innovations, and the noise that is assumed because of it.
 
 A lag shows as innovations of one sign long before any one of them is large: so the trigger is a signed mean,
 and not the size of the innovations.
