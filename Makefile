@@ -79,8 +79,8 @@ fuzz: $(DEV) ## 10 million executions of the firmware's core beside its model, a
 mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/firmware/mutants.toml says why not
 	@$(BIN)/python -m tools.mutants $(ARGS)
 
-firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes
-	@$(BIN)/python -m tools.artefact
+firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes; ARGS="--boards FOLDER" for boards of one's own
+	@$(BIN)/python -m tools.artefact $(ARGS)
 
 numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulated arm leaves its limits
 	@$(BIN)/python -m tools.typed_numbers $(ARGS)

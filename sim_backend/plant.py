@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import Truth
@@ -116,10 +117,11 @@ class EulerPlant:
 
 def make_plant(rig: Rig) -> Plant:
     """Make the plant that a rig's `[sim]` and `[model]` describe."""
-    kinds: dict[str, type[MoreauPlant] | type[EulerPlant]] = {"moreau": MoreauPlant, "euler": EulerPlant}
+    module, _, name = rig.sim.plant_class.partition(":")
     steps = rig.plant_steps
     place = {"position": rig.sim.position_rad, "step": rig.period / steps}
     details = rig.sim.details
     if details is not None:
         return DetailedPlant(rig.plant, rig.model.values(), details, **place, steps=steps)
-    return kinds[rig.sim.integrator](rig.plant, rig.model.values(), **place, steps=steps)
+    plant: Plant = getattr(import_module(module), name)(rig.plant, rig.model.values(), **place, steps=steps)
+    return plant

@@ -31,6 +31,15 @@ def test_every_file_is_what_the_dbc_says() -> None:
         assert path.read_text("utf-8") == text, f"{path}: make generate"
 
 
+def test_the_folder_of_the_call_and_its_settings_do_not_matter(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    right = files()
+    (tmp_path / "ruff.toml").write_text("line-length = 40\nindent-width = 2\n", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert files() == right
+
+
 def test_every_generated_file_says_so_and_no_other_does() -> None:
     marked = {
         path

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import re
 import shutil
@@ -12,7 +11,8 @@ import sys
 from pathlib import Path
 
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
-from tools.boards import read_boards, released
+from tools import manifest
+from tools.boards import BOARDS_HELP, FOLDER, read_boards, released
 
 FIRMWARE = Path(__file__).resolve().parent.parent / "firmware"
 PIECES = ("elf", "bin", "vectors.bin", "code.bin", "map")
@@ -20,8 +20,8 @@ INSTALL = "apt install --no-install-recommends cmake gcc-arm-none-eabi"
 _MEMORY_USE = re.compile(r"^\s*(\w+):\s+(\d+) B\s+(\d+) (KB|MB|B)", re.MULTILINE)
 
 
-def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
-    """Build the preset f405 in a folder; return what each board takes of each memory, bytes.
+def compile_boards(folder: Path, boards: Path = FOLDER) -> dict[str, dict[str, int]]:
+    """Build a folder of boards in another folder; return what each board takes of each memory, bytes.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
     said = ""
     for command in (
         # The folder may have been configured for the boards of another folder, which CMake remembers.
-        ["cmake", "--preset", "f405", "-B", str(folder), f"-DDCMP_BOARDS={FIRMWARE / 'boards'}"],
+        ["cmake", "--preset", "f405", "-B", str(folder), f"-DDCMP_BOARDS={boards}"],
         ["cmake", "--build", str(folder), "--clean-first"],
     ):
         done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)  # noqa: S603
@@ -49,32 +49,44 @@ def compile_boards(folder: Path) -> dict[str, dict[str, int]]:
     return dict(zip(linked, uses[-len(linked) :], strict=True))
 
 
-def release(built: Path, target: Path, sizes: dict[str, dict[str, int]]) -> dict[str, object]:
-    """Copy what is released; return what is known of it, as it stands in `manifest.json`."""
+def release(
+    built: Path, target: Path, sizes: dict[str, dict[str, int]], boards: Path = FOLDER
+) -> dict[str, object]:
+    """Copy what is released; return what is known of it, as it stands in `manifest.json`.
+
+    Raises
+    ------
+    RuntimeError
+        If a board.h is newer than the program that was built of it.
+    """
     target.mkdir(parents=True, exist_ok=True)
-    manifest: dict[str, object] = {"protocol_hash": f"0x{PROTOCOL_HASH:08x}", "boards": {}}
-    for board in released(read_boards()):
-        files = {}
-        for piece in PIECES:
-            data = (built / f"{board}.{piece}").read_bytes()
-            (target / f"{board}.{piece}").write_bytes(data)
-            files[f"{board}.{piece}"] = hashlib.sha256(data).hexdigest()
-        manifest["boards"][board] = {"bytes": sizes[board], "sha256": files}  # type: ignore[index]
-    (target / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n", "utf-8")
-    return manifest
+    known = {}
+    for board in released(read_boards(boards)):
+        data = boards / board / "board.h"
+        if data.stat().st_mtime_ns > (built / f"{board}.elf").stat().st_mtime_ns:
+            raise RuntimeError(f"{data} was changed while it was built. Build it anew.")
+        images = [target / f"{board}.{piece}" for piece in PIECES]
+        for image in images:
+            image.write_bytes((built / image.name).read_bytes())
+        known[board] = manifest.entry(data, images, sizes[board])
+    made: dict[str, object] = {"protocol_hash": f"0x{PROTOCOL_HASH:08x}", "boards": known}
+    (target / manifest.NAME).write_text(json.dumps(made, indent=2) + "\n", "utf-8")
+    return made
 
 
 def main() -> int:
     """Build the artefact, copy it, and print its size."""
     parser = argparse.ArgumentParser(prog="python -m tools.artefact", description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", default=Path("dist/firmware"))
-    folder = parser.parse_args().folder.resolve()
+    parser.add_argument("--boards", type=Path, default=FOLDER, help=BOARDS_HELP)
+    asked = parser.parse_args()
+    folder, boards = asked.folder.resolve(), asked.boards.resolve()
     try:
-        sizes = compile_boards(FIRMWARE / "build/f405")
+        sizes = compile_boards(FIRMWARE / "build/f405", boards)
+        release(FIRMWARE / "build/f405", folder, sizes, boards)
     except RuntimeError as error:
         sys.stderr.write(f"error: {error}\n")
         return 3
-    release(FIRMWARE / "build/f405", folder, sizes)
     for board, use in sizes.items():
         sys.stdout.write(
             f"{board:16}" + "".join(f"{name:>10} {used:6} B" for name, used in use.items()) + "\n"

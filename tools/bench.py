@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.control.observers import Observer
-    from dcmp_hil.control.observers.discretisation import Copy
+    from dcmp_hil.control.observers.discretisation import LuenbergerCopy
 
 _ROUND_COUNT = 7
 
@@ -94,7 +94,7 @@ def _step_us(make: Callable[[], Observer]) -> float:
     return 1e6 * (time.process_time() - began) / len(samples)
 
 
-def _odd_step_us(setting: ObserverContext, copy: Callable[..., Copy]) -> float:
+def _odd_step_us(setting: ObserverContext, copy: Callable[..., LuenbergerCopy]) -> float:
     """Cost of one step of the default observer where the device's clock is 5 % off, by either way, us."""
     samples = [Sample(1.05e-3 * k, 1e-3 * (k % 7), 1.0) for k in range(4000)]
     with patch.object(super_twisting, "copy_step", copy):

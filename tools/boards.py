@@ -15,10 +15,12 @@ if TYPE_CHECKING:
 
 _ROOT = Path(__file__).resolve().parent.parent
 FOLDER = _ROOT / "firmware/boards"
+BOARDS_HELP = "a folder with a folder for each board (default: firmware/boards)"
 PROTOCOL, README = _ROOT / "docs/protocol.md", _ROOT / "firmware/README.md"
 ON_A_PC = {1: "simulated (in process)", 2: "native process"}
 """The numbers of the devices without a chip."""
-_LINE = re.compile(r"^#define BOARD_([A-Z_]+) (\w+)", re.MULTILINE)
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_LINE = re.compile(r"^#define BOARD_([A-Z_]+) +(\w+)", re.MULTILINE)
 PIN_MEANINGS = {
     "ENABLE": "ENABLE, high; **with a resistor to ground at the amplifier**: after a reset no pin drives it",
     "ENCODER_A": "encoder A (TIM2; pulled up, for open collectors)",
@@ -40,6 +42,7 @@ class Board(NamedTuple):
 
     name: str
     number: int  # the parameter BOARD
+    package_pins: int
     crystal_Hz: int  # noqa: N815
     flash_KiB: int  # noqa: N815
     ram_KiB: int  # noqa: N815
@@ -64,15 +67,14 @@ def read_boards(folder: Path = FOLDER) -> dict[str, Board]:
 
 
 def _read(file: Path) -> Board:
-    values = dict(_LINE.findall(file.read_text("utf-8")))
+    values = dict(_LINE.findall(_COMMENT.sub(" ", file.read_text("utf-8"))))
+    keys = ("NUMBER", "PACKAGE_PINS", "CRYSTAL_HZ", "FLASH_KIB", "RAM_KIB")
     try:
-        number, crystal, flash, ram = (
-            int(values[key].removesuffix("u")) for key in ("NUMBER", "CRYSTAL_HZ", "FLASH_KIB", "RAM_KIB")
-        )
+        number, package, crystal, flash, ram = (int(values[key].removesuffix("u")) for key in keys)
     except (KeyError, ValueError) as error:
         raise ValueError(f"{file}: {error}. Build the firmware: CMake says what is missing.") from None
     pins = {key: pin for key, pin in values.items() if re.fullmatch(r"P[A-G]\d+", pin)}
-    return Board(file.parent.name, number, crystal, flash, ram, pins)
+    return Board(file.parent.name, number, package, crystal, flash, ram, pins)
 
 
 def released(boards: Mapping[str, Board]) -> list[str]:
@@ -93,6 +95,7 @@ def _pins(boards: Iterable[Board]) -> str:
         for key, what in PIN_MEANINGS.items()
     ]
     data = {
+        "chip's package, pins": [str(board.package_pins) for board in shown],
         "crystal, MHz": [f"{board.crystal_Hz / 1e6:g}" for board in shown],
         "flash, RAM, KiB": [f"{board.flash_KiB}, {board.ram_KiB}" for board in shown],
         "parameter BOARD": [str(board.number) for board in shown],

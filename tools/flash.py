@@ -7,6 +7,7 @@ a debug probe. The brown-out level is looked at first; a debug probe sets it.
 from __future__ import annotations
 
 import argparse
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,16 +17,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
-from sim_backend.board.config import board_config
-from tools import brown_out
-from tools.boards import read_boards, released
+from tools import brown_out, manifest
+from tools.boards import BOARDS_HELP, FOLDER, read_boards, released
 from tools.brown_out import OptionError
-from tools.record import RECORD_ADDRESS, RecordLink, image, record
+from tools.record import RECORD_ADDRESS, image
+from tools.rig_record import record_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.config import Rig
+    from tools.boards import Board
 
 VECTORS_ADDRESS, CODE_ADDRESS = 0x0800_0000, 0x0800_C000
 INSTALL = {
@@ -33,8 +34,6 @@ INSTALL = {
     "pyocd": "pip install pyocd && pyocd pack install stm32f405rg",
 }
 _STM32FLASH_COMMAND = ["stm32flash", "-b", "115200"]  # to the boot loader
-_DAC_FULL_SCALE_V = 10.0  # V, full scale unless it is said
-_SUPPLY_RANGE_V = (1.0, 100.0)  # V
 
 
 class Piece(NamedTuple):
@@ -42,74 +41,6 @@ class Piece(NamedTuple):
 
     file: Path
     address: int
-
-
-def record_of(
-    rig: Rig,
-    board: str,
-    *,
-    zero_code: int = 2048,
-    full_scale_V: float | None = None,
-    supply_V: float | None = None,
-) -> bytes:
-    """Return the record of a board that fits a rig.
-
-    Parameters
-    ----------
-    zero_code
-        The DAC's code at which the amplifier puts out 0 V.
-    full_scale_V
-        V, that 2048 codes of a DAC more put out; None is 10.
-    supply_V
-        V, the motor's supply, of which a PWM board puts out a part. No other board has it, and no rig's key
-        `amplifier.supply_V` may say otherwise.
-
-    Raises
-    ------
-    ConfigError
-        If the rig is not one for a device, asks for more than the board can put out, or the supply is not
-        known or not the rig's.
-    """
-    kind = rig.backend.kind
-    if kind not in ("serial", "can"):
-        raise ConfigError(
-            f"backend.kind: got {kind!r}; a board is at serial or can. Start from bench-serial."
-        )
-    full_scale = _full_scale(rig, board, full_scale_V, supply_V)
-    config = board_config(rig, read_boards()[board].number)
-    full_scale_mV = round(1e3 * full_scale)
-    if config["voltage_limit_mV"] > full_scale_mV:
-        raise ConfigError(
-            f"amplifier.voltage_limit_V: got {1e-3 * config['voltage_limit_mV']:g}; expected "
-            f"{full_scale:g} V or less, the board's full scale. Lower it, or say --full-scale-V."
-        )
-    slcan = getattr(rig.backend, "interface", "") == "slcan"
-    link = RecordLink.cobs if kind == "serial" else RecordLink.slcan if slcan else RecordLink.can
-    baud = getattr(rig.backend, "baud", None) or getattr(rig.backend, "tty_baud", None) or 1_000_000
-    return record(config, link=link, baud=baud, zero_code=zero_code, full_scale_mV=full_scale_mV)
-
-
-def _full_scale(rig: Rig, board: str, full_scale_V: float | None, supply_V: float | None) -> float:
-    """Return what the board puts out at most, V: of a PWM board it is the supply, and nothing is assumed."""
-    rig_supply = rig.amplifier.supply_V
-    if read_boards()[board].amplifier != "pwm":
-        if supply_V is not None or rig_supply != "none":
-            where = "--supply-V" if supply_V is not None else "amplifier.supply_V"
-            raise ConfigError(f"{where}: {board} divides no supply. Leave it out; see --full-scale-V.")
-        return _DAC_FULL_SCALE_V if full_scale_V is None else full_scale_V
-    if full_scale_V is not None:
-        raise ConfigError(f"--full-scale-V: the full scale of {board} is the motor's supply. Say --supply-V.")
-    if supply_V is None or not _SUPPLY_RANGE_V[0] <= supply_V <= _SUPPLY_RANGE_V[1]:
-        raise ConfigError(
-            f"--supply-V: got {supply_V}; {board} puts out a part of the motor's supply, and every limit is "
-            "wrong by the factor by which this number is. Measure the supply, and say it: --supply-V 24."
-        )
-    if rig_supply != supply_V:
-        raise ConfigError(
-            f"amplifier.supply_V: the rig says {rig_supply}, --supply-V {supply_V:g}. Write the measured one "
-            "into the rig: every run compares it with the board."
-        )
-    return supply_V
 
 
 def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
@@ -124,9 +55,23 @@ def commands(by: str, pieces: Sequence[Piece], port: str) -> list[list[str]]:
     return [*writes, [*_STM32FLASH_COMMAND, "-g", f"{VECTORS_ADDRESS:#x}", port]]
 
 
+def _boards(folder: Path) -> dict[str, Board]:
+    """Return the boards of a folder that can be flashed."""
+    try:
+        boards = read_boards(folder)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"--boards: {error}") from None
+    if not boards:
+        raise ConfigError(f"--boards: no board is in {folder}. Give a folder that has NAME/board.h.")
+    return {name: boards[name] for name in released(boards)}
+
+
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m tools.flash", description=__doc__)
-    parser.add_argument("board", choices=released(read_boards()))
+    folder = argparse.ArgumentParser(add_help=False)  # whose boards are the choices
+    folder.add_argument("--boards", type=Path, default=FOLDER, help=BOARDS_HELP)
+    boards = _boards(folder.parse_known_args()[0].boards)
+    parser = argparse.ArgumentParser(prog="python -m tools.flash", description=__doc__, parents=[folder])
+    parser.add_argument("board", choices=boards)
     parser.add_argument("rig", help="whose limits and link the board is to have: a name, or a rig.toml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets")
     parser.add_argument("--full-scale-V", type=float, dest="full_scale_V", help="of a DAC (default: 10)")
@@ -139,7 +84,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--firmware", type=Path, default=Path("dist/firmware"), help="made by make firmware")
     parser.add_argument("--only", choices=("record", "program", "brown-out"), help="write one of them")
     parser.add_argument("--dry-run", action="store_true", help="show the commands")
-    return parser.parse_args()
+    asked = parser.parse_args()
+    asked.board = boards[asked.board]
+    return asked
 
 
 def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
@@ -157,18 +104,26 @@ def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
         kept.write_bytes(image(made))
         pieces.append(Piece(kept, RECORD_ADDRESS))
     if asked.only in (None, "program"):
-        base = asked.firmware / asked.board
-        parts = [
-            Piece(Path(f"{base}.code.bin"), CODE_ADDRESS),
-            Piece(Path(f"{base}.vectors.bin"), VECTORS_ADDRESS),
-        ]
-        missing = [part.file for part in parts if not part.file.is_file()]
-        if missing:
-            raise ConfigError(
-                f"{missing[0]}: there is no such file. Say `make firmware` first, or --firmware."
-            )
+        parts = _program(asked)
         pieces += parts  # the vectors last: an empty board that was half written does not start
     return pieces
+
+
+def _program(asked: argparse.Namespace) -> list[Piece]:
+    """Return the pieces of the board's program, which were built of its board.h."""
+    base = asked.firmware / asked.board.name
+    parts = [
+        Piece(Path(f"{base}.code.bin"), CODE_ADDRESS),
+        Piece(Path(f"{base}.vectors.bin"), VECTORS_ADDRESS),
+    ]
+    missing = [part.file for part in parts if not part.file.is_file()]
+    if missing:
+        raise ConfigError(f"{missing[0]}: there is no such file. Say `make firmware` first, or --firmware.")
+    build = ["python", "-m", "tools.artefact", str(asked.firmware)]
+    build += [] if asked.boards == FOLDER else ["--boards", str(asked.boards)]
+    data = asked.boards / asked.board.name / "board.h"
+    manifest.check_images(data, [part.file for part in parts], f"`{shlex.join(build)}`")
+    return parts
 
 
 def _do(command: list[str], *, dry_run: bool) -> None:
@@ -255,9 +210,9 @@ def _brown_out(asked: argparse.Namespace, file: Path) -> None:
 
 def main() -> int:
     """Write the pieces to the board, or print them."""
-    asked = _arguments()
     with tempfile.TemporaryDirectory() as folder:
         try:
+            asked = _arguments()
             pieces = _pieces(asked, Path(folder))
             _brown_out(asked, Path(folder) / "option.bin")
             for command in commands(asked.by, pieces, asked.port):

@@ -12,7 +12,7 @@ from dcmp_hil.cli.streams import output_failed
 from dcmp_hil.device.client import DeviceClient
 from dcmp_hil.device.discovery import state_in_words
 from dcmp_hil.device.links.listen_only import make_listening_link
-from dcmp_hil.device.node_uniqueness import TickWatch
+from dcmp_hil.device.node_uniqueness import NodeUniqueness
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.values import Fault
@@ -49,16 +49,16 @@ class _Ticks:
     """Warns once of a node that is there twice."""
 
     def __init__(self) -> None:
-        self._watches: dict[int, TickWatch] = {}
+        self._uniqueness_of: dict[int, NodeUniqueness] = {}
         self._told: set[int] = set()
 
     def take(self, node: int, message: Message) -> None:
         """Process a message of a node."""
         if not isinstance(message, SampleReport) or node in self._told:
             return
-        watch = self._watches.setdefault(node, TickWatch())
-        watch.add(message)
-        if watch.two_devices:
+        uniqueness = self._uniqueness_of.setdefault(node, NodeUniqueness())
+        uniqueness.add(message)
+        if uniqueness.two_devices:
             self._told.add(node)
             console.warn(f"two devices send as node {node}: their ticks jump forth and back. Unplug one.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from dcmp_hil.offline import ColumnOptions, Figures, LoggedSignals, ReplayResult, ReplaySettings
 
 _COLUMN_WIDTH_MIN = 9  # characters
+_OWN_REFERENCE_NOTE = (
+    "The disturbance is judged by a reference with the model of this variant, x'' + f0 x' - u, which CSV and "
+    ".rrd hold beside the other one."
+)
 
 
 class Outputs(NamedTuple):
@@ -72,7 +77,7 @@ def execute(
     csv, rrd = _targets(file, outputs)
     recording = read_recording(file, columns)
     result = replay(recording, settings)
-    compared = {label: _compared(label, recording, other) for label, other in variants}
+    compared = {label: _compared(label, recording, other, result) for label, other in variants}
     document = _figures(result, compared)
     if rrd is not None and outputs.rrd is None and (reason := _no_library()):
         console.warn(f"no {rrd}: {reason}")
@@ -106,12 +111,17 @@ def _no_library() -> str:
     return ""
 
 
-def _compared(label: str, recording: LoggedSignals, settings: ReplaySettings) -> ReplayResult:
-    """Replay with the settings of a variant; a fault names the variant."""
+def _compared(
+    label: str, recording: LoggedSignals, settings: ReplaySettings, base: ReplayResult
+) -> ReplayResult:
+    """Replay with the settings of a variant; a fault names it, and a note says what judges another model."""
     try:
-        return replay(recording, settings)
+        result = replay(recording, settings)
     except ConfigError as error:
         raise ConfigError(*(f"--compare {label}: {fault}" for fault in error.faults)) from error.__cause__
+    if not result.has_other_reference(base):
+        return result
+    return dataclasses.replace(result, notes=(*result.notes, _OWN_REFERENCE_NOTE))
 
 
 def _tell(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> None:

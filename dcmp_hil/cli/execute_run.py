@@ -12,7 +12,7 @@ from dcmp_hil.cli import console
 from dcmp_hil.cli.library_output import split_stderr
 from dcmp_hil.cli.orphaned_run import Unattended
 from dcmp_hil.cli.outputs import json_place, try_places
-from dcmp_hil.cli.recording_check import kept_in, space_warning
+from dcmp_hil.cli.recording_check import check_recording, space_warning
 from dcmp_hil.cli.run_document import run_document, write_json
 from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.run_sinks import dashboard, dashboard_replacing, recording, status_line
@@ -194,7 +194,7 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
     cut_off = session.stop.requested
     with session.stop.held():
         result = session.result()
-        kept = kept_in(folder.own, result.periods, wait=not cut_off) if folder else None
+        kept = check_recording(folder.own, result.periods, wait=not cut_off) if folder else None
         ended_by = end.ended_by
         if kept is not None and not kept.complete and end.error is None and end.code == 0:
             ended_by = INCOMPLETE_ENDED_BY

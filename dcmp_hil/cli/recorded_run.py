@@ -10,8 +10,10 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from dcmp_hil.cli import console
+from dcmp_hil.cli import console, unrepeated_changes
 from dcmp_hil.cli.outputs import json_place, try_places, write_each
+from dcmp_hil.cli.replay_options import keys_of
+from dcmp_hil.common.number_range import number
 from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
@@ -21,11 +23,11 @@ from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.untrusted import named_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
     from dcmp_hil.cli.execute_replay import Outputs
-    from dcmp_hil.cli.replay_options import Given
+    from dcmp_hil.cli.replay_options import ReplayOptions, Variant
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.compare import Comparison
     from dcmp_hil.recording.reader import RecordedRun
@@ -63,7 +65,7 @@ def write_exports(
 
 
 @np.errstate(all="ignore")
-def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> None:
+def replay_own(file: Path, options: ReplayOptions, outputs: Outputs, *, trust: bool) -> None:
     """Run observer and controller over a recording again, and compare.
 
     Raises
@@ -72,7 +74,7 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
         If the recording cannot be read, an option says what a run knows itself, or an override is none of
         observer, controller or model.
     """
-    refused = given.refused_of_a_run()
+    refused = options.refused_of_a_run()
     if refused:
         raise ConfigError(
             f"{', '.join(refused)}: for a CSV file only; a run of dcmp-hil knows its columns, units, "
@@ -86,19 +88,14 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
     if not len(run.rows):
         raise _incomplete(run) if run.damage else ConfigError(f"{run.path}: no period is in it.")
     _tell_faults(run)
-    keys, start = given.keys(), given.figures.get("start") or 0.0
+    keys, start = options.keys(), options.figures.get("start") or 0.0
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
-        raise ConfigError(f"--from: got {start:g} s; the run lasts {lasted:.4g} s. Write less.")
-    rig = _changed(run.rig, keys, trust=trust)
-    again = reexecute(run, rig, trust=trust)
-    others = {
-        label: _repeated(run, label, other, trust=trust)
-        for label, other in given.compared(rig or run.rig, _MAY_CHANGE)
-    }
+        raise ConfigError(f"--from: got {number(start)} s; the run lasts {lasted:.4g} s. Write less.")
+    again, others = _repetitions(run, options, keys, trust=trust)
     result = compare(run, again, start)
     compared = {label: compare(run, other, start) for label, other in others.items()}
-    figures = _figures(result, compared)
+    figures = _figures(result, again, compared, others)
     written, faults = write_each(
         [
             (outputs.csv, partial(export.reexecution_to_csv, run, again, others)),
@@ -114,14 +111,52 @@ def replay_own(file: Path, given: Given, outputs: Outputs, *, trust: bool) -> No
         if path != json_file:
             console.note(f"wrote {path}")
     _end(run, faults)
+    if not keys:
+        _check_repeated(run, again)
 
 
-def _repeated(run: RecordedRun, label: str, rig: Rig, *, trust: bool) -> Reexecution:
+def _repetitions(
+    run: RecordedRun, options: ReplayOptions, keys: Sequence[str], *, trust: bool
+) -> tuple[Reexecution, dict[str, Reexecution]]:
+    """Run it again with the overrides of `keys`, and with each variant; tell what is not repeated of it."""
+    rig = _changed(run.rig, keys, trust=trust)
+    again = reexecute(run, rig, pinned=keys_of(keys), trust=trust)
+    others = {
+        variant.label: _repeated(run, variant, keys_of((*keys, *variant.overrides)), trust=trust)
+        for variant in options.compared(rig or run.rig, _MAY_CHANGE)
+    }
+    unrepeated_changes.tell(" ".join(keys) or str(run.path), again.unrepeated)
+    for label, other in others.items():
+        unrepeated_changes.tell(label, other.unrepeated)
+    return again, others
+
+
+def _check_repeated(run: RecordedRun, again: Reexecution) -> None:
+    """Check that a repetition with the run's own rig made all of its changes.
+
+    Raises
+    ------
+    IncompleteError
+        If not.
+    """
+    refused = unrepeated_changes.refused(again.unrepeated)
+    if refused:
+        raise IncompleteError(
+            f"{run.path}: {len(refused)} of its changes cannot be repeated: the warnings say which. What was "
+            "made of it is without them."
+        )
+
+
+def _repeated(
+    run: RecordedRun, variant: Variant[Rig], pinned: Collection[str], *, trust: bool
+) -> Reexecution:
     """Run a variant of `--compare`; a fault names it."""
+    rig = variant.tables.in_folder(run.rig.folder if trust else None)
     try:
-        return reexecute(run, rig.in_folder(run.rig.folder if trust else None), trust=trust)
+        return reexecute(run, rig, pinned=pinned, trust=trust)
     except ConfigError as error:
-        raise ConfigError(*(f"--compare {label}: {fault}" for fault in error.faults)) from error.__cause__
+        faults = (f"--compare {variant.label}: {fault}" for fault in error.faults)
+        raise ConfigError(*faults) from error.__cause__
 
 
 def _read(file: Path) -> RecordedRun:
@@ -179,14 +214,25 @@ def _changed(rig: Rig, overrides: Sequence[str], *, trust: bool) -> Rig | None:
     return load_table(table, overrides, rig.folder if trust else None)
 
 
-def _figures(result: Comparison, compared: Mapping[str, Comparison]) -> dict[str, Any]:
+def _figures(
+    result: Comparison,
+    again: Reexecution,
+    compared: Mapping[str, Comparison],
+    repeated: Mapping[str, Reexecution],
+) -> dict[str, Any]:
     """Return what `--json` writes: the figures of the run and of each repetition."""
     lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
-    found = {"identical": result.identical, "rows": result.rows, **lines}
+    found = {
+        "identical": result.identical,
+        "rows": result.rows,
+        "unrepeated_changes": unrepeated_changes.document(again.unrepeated),
+        **lines,
+    }
     others = [
         {
             "set": label,
             "identical": other.identical,
+            "unrepeated_changes": unrepeated_changes.document(repeated[label].unrepeated),
             **{line.name: line.again for line in other.figures},
         }
         for label, other in compared.items()

@@ -18,8 +18,8 @@ _UNLIMITED_RUN_DURATION_S = 600.0  # s that a run without a duration is taken fo
 _MB_PER_BYTE = 1e-6
 
 
-class Kept(NamedTuple):
-    """The kept recording of a run: its file and completeness.
+class RecordingCheck(NamedTuple):
+    """Completeness of a run's recording, as the end of its file states it.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Kept(NamedTuple):
         return self._asdict()
 
 
-def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
+def check_recording(path: Path, periods: int, *, wait: bool) -> RecordingCheck:
     """Check the end of a run's recording.
 
     Parameters
@@ -66,16 +66,16 @@ def kept_in(path: Path, periods: int, *, wait: bool) -> Kept:
         ending = ending_of(path)
     if ending is None:
         why = "its end is missing" if path.exists() else "it is gone"
-        return Kept(path.name, False, None, (), f"{path}: {why}; what is there can be read.")
+        return RecordingCheck(path.name, False, None, (), f"{path}: {why}; what is there can be read.")
     lost = sum(many for _, _, many in ending.missing)
     if lost:
         spans = ", ".join(f"{start:.6g} s to {stop:.6g} s" for start, stop, _ in ending.missing)
         why = f"{path} misses {lost} of {periods} periods, device time {spans}: the disk was full."
-        return Kept(path.name, False, ending.periods - lost, ending.missing, why)
+        return RecordingCheck(path.name, False, ending.periods - lost, ending.missing, why)
     if ending.periods < periods:
         why = f"{path} misses {periods - ending.periods} of {periods} periods: its disk was too slow."
-        return Kept(path.name, False, ending.periods, (), why)
-    return Kept(path.name, True, ending.periods, (), "")
+        return RecordingCheck(path.name, False, ending.periods, (), why)
+    return RecordingCheck(path.name, True, ending.periods, (), "")
 
 
 def space_warning(folder: Path, free: float, rig: Rig, length: float, *, picture: bool) -> str:

@@ -196,9 +196,9 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     For a run of dcmp-hil, its observer and controller run again, with other gains if you give some.
     """
     from dcmp_hil.cli import execute_replay
-    from dcmp_hil.cli.replay_options import Given
+    from dcmp_hil.cli.replay_options import ReplayOptions
 
-    given = Given(
+    options = ReplayOptions(
         columns={
             "time": time,
             "position": position,
@@ -224,7 +224,7 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
     if file.suffix == ".mcap" or file.is_dir():
         from dcmp_hil.cli.recorded_run import replay_own
 
-        replay_own(file, given, outputs, trust=trust)
+        replay_own(file, options, outputs, trust=trust)
     else:
-        columns, settings = given.column_options(), given.settings()
-        execute_replay.execute(file, columns, settings, outputs, given.compared_settings())
+        columns, settings = options.column_options(), options.settings()
+        execute_replay.execute(file, columns, settings, outputs, options.compared_settings())

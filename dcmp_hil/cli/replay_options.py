@@ -6,15 +6,16 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.config import change_rig, load_tables
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
 from dcmp_hil.offline.settings import PERIOD_RANGE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from dcmp_hil.config.tables import RigTables
 
@@ -33,8 +34,26 @@ _OPTION_KEYS = {  # short options for keys of a rig
 _FILE_TABLES = ("observer", "model", "encoder")
 
 
+class Variant(NamedTuple, Generic[T]):
+    """A variant of `--compare`.
+
+    Parameters
+    ----------
+    label
+        Its overrides in one text.
+    overrides
+        `key=value` with the full key.
+    tables
+        The rig with them.
+    """
+
+    label: str
+    overrides: tuple[str, ...]
+    tables: T
+
+
 @dataclass(frozen=True)
-class Given:
+class ReplayOptions:
     """The options as they were written; None or absent where one was not.
 
     Parameters
@@ -85,8 +104,8 @@ class Given:
             *self.overrides,
         )
 
-    def compared(self, tables: T, allowed: Sequence[str]) -> list[tuple[str, T]]:
-        """Return each variant of `--compare`: its keys in one text, and the tables with them.
+    def compared(self, tables: T, allowed: Sequence[str]) -> list[Variant[T]]:
+        """Return each variant of `--compare`.
 
         Parameters
         ----------
@@ -100,9 +119,9 @@ class Given:
         ConfigError
             If a variant is there twice, or cannot be made.
         """
-        found: dict[str, T] = {}
+        found: dict[str, Variant[T]] = {}
         for text in self.variants:
-            keys = [_full_key(part.strip()) for part in text.split(";") if part.strip()]
+            keys = tuple(_full_key(part.strip()) for part in text.split(";") if part.strip())
             label = "; ".join(keys)
             if label in found:
                 raise ConfigError(f"--compare {text}: given twice. Leave one out.")
@@ -113,11 +132,11 @@ class Given:
                     "parts several keys."
                 )
             try:
-                found[label] = change_rig(tables, keys)
+                found[label] = Variant(label, keys, change_rig(tables, keys))
             except ConfigError as error:
                 faults = (f"--compare {fault.removeprefix('--set ')}" for fault in error.faults)
                 raise ConfigError(*faults) from None
-        return list(found.items())
+        return list(found.values())
 
     def refused_of_a_run(self) -> list[str]:
         """Return the options that were given and mean nothing for a run's own recording."""
@@ -136,8 +155,8 @@ class Given:
         period = self.file.get("period")
         if period is not None and not PERIOD_RANGE.holds(period):
             raise ConfigError(
-                f"--period: got {period:g}; expected {PERIOD_RANGE.words('s')}. Give the time from row to "
-                "row, or leave it out to take the stamps."
+                f"--period: got {number(period)}; expected {PERIOD_RANGE.words('s')}. Give the time from row "
+                "to row, or leave it out to take the stamps."
             )
         ku = any(key.partition("=")[0].strip() == _OPTION_KEYS["ku"] for key in self.keys())
         return ColumnOptions(
@@ -168,7 +187,7 @@ class Given:
             If a variant is there twice, or cannot be made.
         """
         variants = self.compared(self._tables, _FILE_TABLES[:2])
-        return [(label, self._settings(tables)) for label, tables in variants]
+        return [(variant.label, self._settings(variant.tables)) for variant in variants]
 
     def _settings(self, tables: RigTables) -> ReplaySettings:
         input_at = self.file.get("input_at")
@@ -216,6 +235,12 @@ class Given:
             raise ConfigError(
                 f'--counts-per-rev: got "{text}". Write the counts after quadrature, such as 4096, or ideal.'
             ) from None
+
+
+def keys_of(overrides: Iterable[str]) -> frozenset[str]:
+    """Return the dotted keys that overrides name."""
+    keys = (override.partition("=")[0] for override in overrides)
+    return frozenset(".".join(part.strip() for part in key.split(".")) for key in keys)
 
 
 def _settings_of(rig: RigTables, *, named: bool) -> dict[str, Any]:

@@ -12,13 +12,18 @@ from dcmp_hil.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dcmp_hil.cli.recording_check import Kept
+    from dcmp_hil.cli.recording_check import RecordingCheck
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 
 
 def run_document(
-    rig: Rig, note: str, faults: Sequence[str], result: Result, ended_by: str, kept: Kept | None = None
+    rig: Rig,
+    note: str,
+    faults: Sequence[str],
+    result: Result,
+    ended_by: str,
+    kept: RecordingCheck | None = None,
 ) -> dict[str, Any]:
     """Return what `--json` writes; `kept` is None where nothing is recorded, or it was not looked at."""
     return {

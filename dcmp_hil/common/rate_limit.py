@@ -1,4 +1,9 @@
-"""Messages of one name are let through at most once in a period of time, which is an argument."""
+"""Messages of one name are let through at most once in a period of time, which is an argument.
+
+Its user is the limiter of the loop, which would tell of a limit in every period. Other messages need no such
+limit: each cause of a link is warned of once in a run, its counters are told in every second, and of
+the web server's lines one of each kind is told.
+"""
 
 from __future__ import annotations
 

@@ -27,6 +27,7 @@ T = TypeVar("T", bound="RigTables")
 _RIGS_FOLDER = resources.files("dcmp_hil").joinpath("rigs")
 _FILE_BYTES_MAX = 128 * 1024  # bytes: no rig is that long
 _LINE_CHARS_MAX = 4096  # characters: the time for a dotted key grows with the square of its length
+_SHOWN_KEYS_MAX = 3  # keys that a message lists
 
 
 def shipped_rigs() -> list[str]:
@@ -74,10 +75,7 @@ def load_table(table: dict[str, Any], overrides: Sequence[str] = (), folder: Pat
 
 def _checked(table: dict[str, Any], place: str, folder: Path | None, overrides: Sequence[str]) -> Rig:
     set_keys = apply_overrides(table, overrides)
-    try:
-        rig = Rig.model_validate(table)
-    except ValidationError as error:
-        raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
+    rig = _validated(Rig, table, place, set_keys)
     if folder is None:
         return rig
     rig = _with_reference_file(rig, folder, place, set_keys)
@@ -106,11 +104,7 @@ def load_tables(source: str | Path | None, overrides: Sequence[str] = ()) -> Rig
     table = parse(text, place)
     if source is not None:
         table.setdefault("name", name_from(Path(place).stem))
-    set_keys = apply_overrides(table, overrides)
-    try:
-        tables = OpenLoopTables.model_validate(table)
-    except ValidationError as error:
-        raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
+    tables = _validated(OpenLoopTables, table, place, apply_overrides(table, overrides))
     return tables if folder == Path() else tables.in_folder(folder.absolute())
 
 
@@ -124,10 +118,27 @@ def change_rig(rig: T, overrides: Sequence[str]) -> T:
     """
     table = rig.model_dump(exclude_unset=True)
     set_keys = apply_overrides(table, overrides)
+    return _validated(type(rig), table, rig.name, set_keys).in_folder(rig.folder)
+
+
+def _validated(kind: type[T], table: dict[str, Any], place: str, set_keys: Collection[str]) -> T:
+    """Return the tables of a rig, checked; every rig that is loaded or changed is made here.
+
+    Raises
+    ------
+    ConfigError
+        With every fault found; or if a rule cannot be computed with these numbers.
+    """
     try:
-        return type(rig).model_validate(table).in_folder(rig.folder)
+        return kind.model_validate(table)
     except ValidationError as error:
-        raise ConfigError(*explain_faults(error, table, rig.name, set_keys)) from None
+        raise ConfigError(*explain_faults(error, table, place, set_keys)) from None
+    except ArithmeticError as error:
+        keys = [printable(key) for key in sorted(set_keys) if "." in key][:_SHOWN_KEYS_MAX]
+        where = f"--set {', '.join(keys)}" if keys else place
+        raise ConfigError(
+            f"{where}: a number is too large or too small to compute with ({error}). Write a usual one."
+        ) from None
 
 
 def copy_rig(name: str, target: Path) -> list[Path]:

@@ -34,9 +34,21 @@ class OpenLoopTables(RigTables):
 
 
 def _check(tables: RigTables, rules: Iterable[Callable[[RigTables], str]]) -> None:
-    faults = [fault for rule in rules if (fault := rule(tables))]
+    """Raise ValueError with the faults that the rules find; ArithmeticError if one cannot be computed."""
+    faults: list[str] = []
+    failed: Exception | None = None
+    for rule in rules:
+        try:
+            fault = rule(tables)
+        except (ArithmeticError, ValueError) as error:  # numpy's LinAlgError is a ValueError
+            failed = error  # most likely because of a number that another rule refuses
+            continue
+        if fault:
+            faults.append(fault)
     if faults:
         raise ValueError("\n".join(faults))
+    if failed is not None:
+        raise ArithmeticError(str(failed)) from failed
 
 
 def _kinds(union: Any) -> dict[str, type[Section]]:

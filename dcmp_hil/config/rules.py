@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.number_range import NumberRange, number
+from dcmp_hil.config.formatting import range_of
 from dcmp_hil.config.gain_rules import gains_hold
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.control.observers.super_twisting import bandwidth_floor
@@ -42,9 +43,9 @@ def _step_divides_period(rig: RigTables) -> str:
         return ""
     fits = rig.period * 1e6 / max(1, math.ceil(steps - 1e-9))
     return (
-        f"sim.step_us: got {rig.sim.step_us:g} us, which does not divide the period of "
+        f"sim.step_us: got {number(rig.sim.step_us)} us, which does not divide the period of "
         f"{rig.period * 1e6:g} us "
-        f'(loop.rate_hz = {rig.loop.rate_hz:g}). {fits:g} us would, or write "auto".'
+        f'(loop.rate_hz = {number(rig.loop.rate_hz)}). {fits:g} us would, or write "auto".'
     )
 
 
@@ -81,8 +82,9 @@ def _floor_below_rate(rig: RigTables) -> str:
         return ""
     usual = bandwidth_floor(rig.encoder.counts, rig.period)
     return (
-        f"observer.mu0_rad_s: got {mu0:g} rad/s, too fast for loop.rate_hz = {rig.loop.rate_hz:g}: "
-        f"at most {0.3 / rig.period:g} rad/s. Leave the key out to get {usual:.3g} rad/s, or raise the rate."
+        f"observer.mu0_rad_s: got {number(mu0)} rad/s, too fast for loop.rate_hz = "
+        f"{number(rig.loop.rate_hz)}: at most {0.3 / rig.period:g} rad/s. "
+        f"Leave the key out to get {usual:.3g} rad/s, or raise the rate."
     )
 
 
@@ -239,14 +241,20 @@ def _within_reason(rig: RigTables) -> str:
     )
 
 
+def own_bounds(section: type[Section], key: str) -> NumberRange:
+    """Return the bounds that a table states for one of its keys; infinite where it states none."""
+    described = section.model_json_schema()["properties"][key]
+    return range_of(
+        {name: bound for one in (described, *described.get("anyOf", ())) for name, bound in one.items()}
+    )
+
+
 def within_reason(section: type[Section], key: str) -> tuple[float, float]:
     """Return the smallest and the largest number that a key of a table may have, infinite without a unit."""
-    described = section.model_json_schema()["properties"][key]
-    bounds = {name: bound for one in (described, *described.get("anyOf", ())) for name, bound in one.items()}
+    own = own_bounds(section, key)
     largest = _PLAUSIBLE_MAX.get(split_unit(key)[1], math.inf)
-    if bounds.get("exclusiveMinimum") == 0:
-        return _POSITIVE_MIN, largest
-    return float(bounds.get("minimum", -largest)), largest
+    low = _POSITIVE_MIN if own.low == 0.0 and own.low_excluded else max(own.low, -largest)
+    return low, min(own.high, largest)
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:

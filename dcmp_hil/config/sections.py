@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from dcmp_hil.common.section import Section
 from dcmp_hil.control.model import Model, PlantDetails
 
+PLANTS = {
+    "moreau": ("sim_backend.plant:MoreauPlant", "friction that can stick"),
+    "euler": ("sim_backend.plant:EulerPlant", "the paper's explicit Euler steps"),
+}
+"""Simulated plants by the word of `sim.integrator`, the default first: class, and what it is."""
+if TYPE_CHECKING:
+    _Integrator = str
+else:
+    _Integrator = Literal[tuple(PLANTS)]
 _REFERENCE_LIMIT_SHARE = 0.95  # of a limit that trips: room to overshoot a reference that stops there
 
 
@@ -109,8 +118,10 @@ class SimSection(Section):
 
     step_us: Annotated[float, Field(ge=1, le=10_000)] | Literal["auto"] = "auto"
     """Plant step, us; must divide the period. "auto": the largest divisor not above 200 us."""
-    integrator: Literal["moreau", "euler"] = "moreau"
-    """`moreau`: friction that can stick; `euler`: the paper's explicit Euler steps."""
+    integrator: Annotated[
+        _Integrator,
+        Field(description="; ".join(f"`{word}`: {what}" for word, (_, what) in PLANTS.items()) + "."),
+    ] = next(iter(PLANTS))
     position_rad: Annotated[float, Field(ge=-100, le=100)] = 0.0
     """Position of the arm at the start, at rest, rad; 0 = hanging."""
     encoder_phase_counts: Annotated[float, Field(ge=0, lt=1)] = 0.0
@@ -152,6 +163,11 @@ class SimSection(Section):
             cogging=self.cogging_rad_s2,
             cogging_per_rev=self.cogging_per_rev,
         )
+
+    @property
+    def plant_class(self) -> str:
+        """Class of the simulated plant, as `module:Class`."""
+        return PLANTS[self.integrator][0]
 
 
 class SupervisorSection(Section):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.conformance.check import Outcome, Verdict
 from dcmp_hil.conformance.terms import NotJudgedError
-from dcmp_hil.device.node_uniqueness import TickWatch
+from dcmp_hil.device.node_uniqueness import NodeUniqueness
 from dcmp_hil.errors import BackendError, OpenError, SampleTimeoutError
 from dcmp_hil.wire.messages import State
 
@@ -72,12 +72,12 @@ def run_checks(
 def _begin(client: Client, *, clear: bool) -> None:
     try:
         client.synchronise()
-        watch = TickWatch()
+        uniqueness = NodeUniqueness()
         for seen in client.listen(_IDENTIFICATION_SAMPLES):
-            watch.add(seen.sample)
+            uniqueness.add(seen.sample)
     except SampleTimeoutError as error:
         raise OpenError(str(error)) from error
-    if watch.two_devices:
+    if uniqueness.two_devices:
         raise OpenError(
             f"{client.line.name}: two devices send as node {client.node}: their ticks jump forth and back. "
             "Unplug one."

@@ -11,7 +11,7 @@ from dcmp_hil.device.client import SKIPPED_FRAMES_MAX, DeviceClient
 from dcmp_hil.device.device_config import DeviceConfig
 from dcmp_hil.device.disarm import DeviceEnd, DisarmSequence
 from dcmp_hil.device.handshake import Handshake
-from dcmp_hil.device.link_statistics import LinkMeter
+from dcmp_hil.device.link_statistics import LinkStatistics
 from dcmp_hil.device.run_state_exit import another_runs, why_left
 from dcmp_hil.errors import BackendError, LinkError, TripError
 from dcmp_hil.values import UNKNOWN_TRUTH, Fault, Sample, Truth
@@ -74,7 +74,7 @@ class DeviceBackend:
         self._heard_ns = 0
         self._forgotten = False  # the device has ended our session, and another host may own it
         self._answered = 0  # tick of the SAMPLE that was answered last
-        self._meter = LinkMeter(link, 1e9 * rig.period)
+        self._statistics = LinkStatistics(link, 1e9 * rig.period)
         self._rates = config.warn_share, config.warn_clock_share
         self.firmware = self._cleared = self._history = ""
         self.clear = False  # whether a person has said that a latched fault of every kind may be cleared
@@ -104,7 +104,7 @@ class DeviceBackend:
         self._first_tick = greeting.tick + 1
         self._answered = greeting.tick
         self._heard_ns = self._clock.now_ns()
-        self._meter.start(greeting.tick, self._heard_ns, client.health)
+        self._statistics.start(greeting.tick, self._heard_ns, client.health)
         self._open = True
         return self
 
@@ -136,12 +136,12 @@ class DeviceBackend:
     @property
     def counters(self) -> LinkCounters:
         """Return a copy of the counts of lost, late and damaged frames since the device was armed."""
-        return self._meter.counters
+        return self._statistics.counters
 
     @property
     def health(self) -> Health | None:
         """The newest HEALTH of the device."""
-        return self._meter.health
+        return self._statistics.health
 
     def concerns(self, counters: LinkCounters) -> list[Concern]:
         """Return the problems that these counters show, by the rates of `[backend]`."""
@@ -186,7 +186,7 @@ class DeviceBackend:
         drive = make(Drive, fields)  # 0.11 us less
         self._answered = self._tick
         self._link.send(pack(drive, self._node))
-        self._meter.answered(self._clock.now_ns())
+        self._statistics.answered(self._clock.now_ns())
 
     def truth(self) -> Truth:
         """Return NaN for every value: a real device has no access to the true state."""
@@ -201,13 +201,13 @@ class DeviceBackend:
         """Wait for a SAMPLE; where several are waiting, the newest."""
         link, now_ns, newest = self._link, self._clock.now_ns, None
         began_ns = heard_ns = now_ns()
-        damaged, stale = self._meter.damaged, self._meter.counts.stale
+        damaged, stale = self._statistics.damaged, self._statistics.counts.stale
         if began_ns - self._heard_ns > self._bridge_ns:
             self._give_up_after(began_ns - self._heard_ns)
         while newest is None:
             left_ns = began_ns + self._patience_ns - heard_ns
             if left_ns <= 0:
-                self._give_up(self._meter.damaged - damaged, self._meter.counts.stale - stale)
+                self._give_up(self._statistics.damaged - damaged, self._statistics.counts.stale - stale)
             frame = link.receive(1e-9 * left_ns)
             if frame is not None:
                 newest = self._take(frame)
@@ -215,7 +215,7 @@ class DeviceBackend:
         if link.pending and newest.state == _RUN:  # the end of a run is not skipped
             newest = self._newest_after(newest)
         self._heard_ns = heard_ns
-        self._meter.heard(self._tick, heard_ns)
+        self._statistics.heard(self._tick, heard_ns)
         return newest
 
     def _newest_after(self, newest: SampleReport) -> SampleReport:
@@ -224,7 +224,7 @@ class DeviceBackend:
             if frame is None:
                 break
             if (newer := self._take(frame)) is not None:
-                self._meter.counts.skipped += 1
+                self._statistics.counts.skipped += 1
                 newest = newer
         return newest
 
@@ -233,16 +233,16 @@ class DeviceBackend:
         try:
             message = unpack(frame, self._node)
         except CorruptFrameError:
-            self._meter.counts.corrupt += 1
+            self._statistics.counts.corrupt += 1
             return None
         if type(message) is SampleReport:
             return self._taken(message)
         if type(message) is FaultReport:
             self._fault = message.code
         elif type(message) is Health:
-            self._meter.take_health(message)
+            self._statistics.take_health(message)
         elif message is None and has_wrong_length(frame, self._node):
-            self._meter.counts.corrupt += 1
+            self._statistics.counts.corrupt += 1
         return None
 
     def _taken(self, report: SampleReport) -> SampleReport | None:
@@ -252,12 +252,12 @@ class DeviceBackend:
         tick = unwrap(last, raw_tick, 8)
         if tick <= last:
             if state == _RUN:
-                self._meter.counts.stale += 1
+                self._statistics.counts.stale += 1
                 return None
             tick = last + 1  # a device that was reset counts anew
-        self._meter.counts.lost += tick - last - 1
+        self._statistics.counts.lost += tick - last - 1
         if state == _RUN:
-            self._meter.sample(report)
+            self._statistics.sample(report)
         self._tick = tick
         self._t = (tick - self._first_tick) * self._period
         if self._has_count:
@@ -294,7 +294,7 @@ class DeviceBackend:
             client.send(Stop(StopReason.SUPERVISOR))
         sequence = DisarmSequence(client, self._clock, self._session, self._ttl_ms)
         self.device_end = sequence.run(answered=self._answered == self._tick)
-        self._meter.take_health(client.health)
+        self._statistics.take_health(client.health)
         if self.device_end is None:
             client.send(Stop(StopReason.NO_SAMPLE))
             raise open_errors.not_confirmed(self._link.name, self._ttl_ms)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from dcmp_hil.device.node_uniqueness import TickWatch
+from dcmp_hil.device.node_uniqueness import NodeUniqueness
 from dcmp_hil.wire.codec import CorruptFrameError, has_wrong_length, pack, unpack
 from dcmp_hil.wire.messages import (
     FaultReport,
@@ -71,7 +71,7 @@ class DeviceClient:
         self.heard: Counter[str] = Counter()  # messages of this device, by kind
         self.nodes: set[int] = set()  # others that were heard
         self.corrupt = 0  # frames whose length or crc8 was wrong
-        self.ticks = TickWatch()
+        self.uniqueness = NodeUniqueness()
         self._owed: dict[object, _Owed] = {}
 
     @property
@@ -197,7 +197,7 @@ class DeviceClient:
         """Store tick, fault or health from a message, and note which request it answers."""
         if isinstance(message, SampleReport):
             self.sample, self.tick = message, unwrap(self.tick, message.tick, 8)
-            self.ticks.add(message)
+            self.uniqueness.add(message)
         elif isinstance(message, FaultReport):
             self.fault, self.fault_detail = message.code, message.detail
         elif isinstance(message, Health):

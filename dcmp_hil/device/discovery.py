@@ -13,7 +13,7 @@ from dcmp_hil.config.backends import Can, Serial
 from dcmp_hil.device.boot_history import history_of
 from dcmp_hil.device.client import DeviceClient
 from dcmp_hil.device.links.listen_only import make_listening_link
-from dcmp_hil.device.node_uniqueness import TickWatch
+from dcmp_hil.device.node_uniqueness import NodeUniqueness
 from dcmp_hil.errors import ConfigError, DcmpError
 from dcmp_hil.safety.device_faults import name_of
 from dcmp_hil.wire.messages import Hello, Identity, SampleReport, State
@@ -197,7 +197,7 @@ def _hear_nodes(client: DeviceClient, clock: Clock, wait: float) -> dict[int, bo
     deadline_ns = clock.now_ns() + int(1e9 * wait)
     ticks: dict[int, int] = {}
     nodes: set[int] = set()
-    watches: dict[int, TickWatch] = {}
+    uniqueness_of: dict[int, NodeUniqueness] = {}
     longest_ns = deadline_ns + int(1e9 * _TWO_DEVICES_LISTEN_S)
     while (left_ns := deadline_ns - clock.now_ns()) > 0:
         heard = client.receive_any(1e-9 * left_ns)
@@ -211,11 +211,11 @@ def _hear_nodes(client: DeviceClient, clock: Clock, wait: float) -> dict[int, bo
                 deadline_ns = clock.now_ns() + int(1e9 * LISTEN_DURATION_S)
             nodes.add(node)
         ticks[node] = sample.tick
-        watch = watches.setdefault(node, TickWatch())
-        watch.add(sample)
-        if watch.suspicious and not watch.two_devices:
+        uniqueness = uniqueness_of.setdefault(node, NodeUniqueness())
+        uniqueness.add(sample)
+        if uniqueness.suspicious and not uniqueness.two_devices:
             deadline_ns = max(deadline_ns, min(longest_ns, clock.now_ns() + int(1e9 * LISTEN_DURATION_S)))
-    twice = {node for node, watch in watches.items() if watch.two_devices}
+    twice = {node for node, uniqueness in uniqueness_of.items() if uniqueness.two_devices}
     return {node: node in twice for node in sorted(nodes | twice)}
 
 

@@ -231,10 +231,10 @@ class Handshake:
 
     def _check_alone(self) -> None:
         """Raise if a second device has the same node number; listen longer if the ticks are odd."""
-        ticks = self._client.ticks
-        if ticks.suspicious:
+        uniqueness = self._client.uniqueness
+        if uniqueness.suspicious:
             self._client.listen(max(_TWIN_LISTEN_S, _TICK_DIFFERENCE_MAX * 1e-6 * self._config.period_us))
-        if ticks.two_devices:
+        if uniqueness.two_devices:
             raise open_errors.two_devices(self._link.name, self._config.node)
 
     def _check_cold(self) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _LATE_MIN_PERIODS = 0.5  # of a period
 
 
-class LinkMeter:
+class LinkStatistics:
     """Counts what is lost, late and damaged, from arming on.
 
     Parameters

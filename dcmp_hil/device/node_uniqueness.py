@@ -15,10 +15,10 @@ _TICKS_MIN = 24
 _ODD_TICKS_SHARE_MIN = 0.25  # of the kept: one reset, frames that come twice or late make fewer
 
 
-class TickWatch:
-    """Sees the ticks of two devices in one stream.
+class NodeUniqueness:
+    """Judges by the ticks in a stream whether two devices have the same node number.
 
-    They jump forth and back; or one tick comes twice, with different contents.
+    Ticks of two devices jump forth and back; or one tick comes twice, with different contents.
     """
 
     def __init__(self) -> None:

@@ -12,7 +12,9 @@ import signal
 import socket
 import subprocess
 import sys
-from contextlib import suppress
+import weakref
+from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +22,7 @@ from dcmp_hil.ipc.shared_memory import Log, reserve
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.inherited_descriptors import forget, keep_from_forks
 from dcmp_hil.platform.python_command import python_command
+from dcmp_hil.platform.uninterrupted import UninterruptedWork
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -38,6 +41,9 @@ main(ParentProcess({parent}, {channel}, {setup}), *{arguments})
 
 class ChildProcess:
     """A child as its parent sees it.
+
+    The constructor returns the owner of a child, or raises and leaves no child: also where the handler of a
+    signal raises in it. A child whose owner is forgotten before `hang_up` is ended.
 
     Parameters
     ----------
@@ -69,6 +75,8 @@ class ChildProcess:
         If it cannot be started.
     """
 
+    _ending: weakref.finalize[..., ChildProcess] | None = None  # while this object alone owns the child
+
     def __init__(
         self,
         module: str,
@@ -80,11 +88,36 @@ class ChildProcess:
         environment: Mapping[str, str] | None = None,
         blocked: Collection[signal.Signals] = (),
     ) -> None:
+        start = UninterruptedWork(
+            partial(self._start, module, setup, shared, arguments, kind, environment, blocked)
+        )
+        try:
+            start.do()
+        except BaseException:  # `_start` failed and left nothing behind, or a signal came at any instant
+            start.settle()
+            if self._ending:
+                self._ending()
+            raise
+
+    def _start(
+        self,
+        module: str,
+        setup: object,
+        shared: Sequence[int],
+        arguments: Sequence[int],
+        kind: socket.SocketKind,
+        environment: Mapping[str, str] | None,
+        blocked: Collection[signal.Signals],
+    ) -> None:
+        """Start it, on a thread of its own, whose signal mask the child inherits."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
         self._setup = reserve(self, "setup")
         Log(self._setup).append(pickle.dumps(setup))
-        self.channel, theirs = socket.socketpair(socket.AF_UNIX, kind)
-        self.channel.setblocking(False)
-        with theirs:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, kind)
+        with theirs, ExitStack() as undo:
+            undo.callback(_hang_up, ours)
+            keep_from_forks(ours.fileno())
+            ours.setblocking(False)
             code = _CODE.format(
                 path=sys.path,
                 module=module,
@@ -93,21 +126,18 @@ class ChildProcess:
                 setup=self._setup,
                 arguments=tuple(arguments),
             )
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
-            try:
-                self.process = subprocess.Popen(  # noqa: S603 - our own code
-                    python_command(code),
-                    pass_fds=[theirs.fileno(), self._setup, *arguments, *shared],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,  # figures go there, and nothing else
-                    env=environment,
-                )
-            except OSError:
-                self.channel.close()
-                raise
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        keep_from_forks(self.channel.fileno())
+            self.process = subprocess.Popen(  # noqa: S603 - our own code
+                python_command(code),
+                pass_fds=[theirs.fileno(), self._setup, *arguments, *shared],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,  # figures go there, and nothing else
+                env=environment,
+            )
+            undo.callback(end_process, self.process, 0.0)
+            self.channel = ours
+            self._ending = weakref.finalize(self, _end_unowned, ours, self.process)
+            self._ending.atexit = False  # the child sees the end of this process, and finishes its work
+            undo.pop_all()
 
     @property
     def pid(self) -> int:
@@ -145,10 +175,10 @@ class ChildProcess:
             self.channel.shutdown(socket.SHUT_WR)
 
     def hang_up(self) -> None:
-        """Close the channel."""
-        if self.channel.fileno() >= 0:
-            forget(self.channel.fileno())
-            self.channel.close()
+        """Close the channel. From then on the child ends by itself, or by `end`."""
+        _hang_up(self.channel)
+        if self._ending:
+            self._ending.detach()
 
     def end(self, within: float) -> int:
         """Wait for it so many seconds, then kill it; return how it ended."""
@@ -201,6 +231,18 @@ def _cpu_time(pid: int) -> int | None:
     except OSError:
         return None
     return None if state == "Z" else int(fields[10]) + int(fields[11])
+
+
+def _hang_up(channel: socket.socket) -> None:
+    if channel.fileno() >= 0:
+        forget(channel.fileno())
+        channel.close()
+
+
+def _end_unowned(channel: socket.socket, process: subprocess.Popen[bytes]) -> None:
+    """End a child whose start was interrupted, or whose owner is forgotten."""
+    _hang_up(channel)
+    end_process(process, 0.0)
 
 
 def end_process(process: subprocess.Popen[bytes], within: float) -> int:

@@ -100,10 +100,13 @@ class CommandProcess:
         self.mailbox.tell_end(last_words, end)
         if self._child is not None:
             self._child.hang_up()
-            self._watch.join(_EXIT_TIMEOUT_S)
+            if self._watch.is_alive():
+                self._watch.join(_EXIT_TIMEOUT_S)
             if self._watch.is_alive():
                 self._child.process.kill()
                 self._watch.join(_EXIT_TIMEOUT_S)
+            else:  # it has ended and was waited for, unless Ctrl-C came before the thread was started
+                self._child.end(_EXIT_TIMEOUT_S)
 
     def _wait(self) -> None:
         """Wait for its end, on a thread that the kernel wakes only then, and that signals get through to."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dcmp_hil.config.rules import within_reason
+from dcmp_hil.config.rules import own_bounds, within_reason
 from dcmp_hil.config.units import in_words, split_unit
 from dcmp_hil.live.tunables import allowed, choices, settable, value_of
 
 if TYPE_CHECKING:
+    from dcmp_hil.common.section import Section
     from dcmp_hil.config import Rig
 
-_SLIDER_RANGES = {  # from, to; both above 0: by decades
+_SLIDER_RANGES = {  # from, to; both above 0: by decades. A key without a row: see `slider_range`
     "kp_1_s2": (100.0, 20_000.0),
     "kd_1_s": (10.0, 400.0),
     "L1_1_s": (0.5, 50.0),
@@ -31,6 +32,7 @@ _SLIDER_RANGES = {  # from, to; both above 0: by decades
 _SEARCH_HALVINGS, _RELATIVE_STEP = 12, 1e-3  # of the search; of a value, the nearest that is tried
 _SLIDER_MAX = 1e9  # of a key without a bound
 _ANGLE_RANGE_RAD = (-3.0, 3.0)
+_USUAL_RATIO = 10.0  # between an end of a slider without a row and the value
 _MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
 
 
@@ -50,7 +52,7 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
     field = kind.model_fields[name]
     value = float(value_of(rig, key))
     low, high = within_reason(kind, name)
-    start, end = _SLIDER_RANGES.get(name, _ANGLE_RANGE_RAD)
+    start, end = slider_range(kind, name, value)
     if name == "mu0_rad_s":
         high = min(high, 0.3 / rig.period)
         start, end = _MU0_SLIDER_MIN_RAD_S, high
@@ -66,6 +68,26 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
         "slider": [min(start, value) if value > 0.0 or start <= 0.0 else start, max(end, value)],
         "decades": start > 0.0 and math.isfinite(end),
     }
+
+
+def slider_range(section: type[Section], name: str, value: float) -> tuple[float, float]:
+    """Return where the slider of a key starts and ends, before the limits of the rig.
+
+    Without a row in the table it goes as far as the key's own bounds; an angle without bounds goes +-3 rad,
+    and any other key a factor 10 to either side of its value.
+    """
+    if name in _SLIDER_RANGES:
+        return _SLIDER_RANGES[name]
+    own = own_bounds(section, name)
+    if math.isfinite(own.low) and math.isfinite(own.high):
+        return own.low, own.high
+    stem, unit = split_unit(name)
+    if unit == "rad" and not split_unit(stem)[1] and not math.isfinite(own.low):  # and not V/rad
+        return _ANGLE_RANGE_RAD
+    far = _USUAL_RATIO * abs(value) or 1.0
+    if own.low < 0.0:
+        return -far, far
+    return (value / _USUAL_RATIO if own.low_excluded else own.low), far
 
 
 def _end(rig: Rig, key: str, value: float, bound: float) -> float:

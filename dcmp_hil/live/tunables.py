@@ -55,7 +55,7 @@ def value_of(rig: Rig, key: str) -> Any:
     return by_rule(section, name, rig) if value is None else value
 
 
-def changed(rig: Rig, overrides: Sequence[str], *, variation: bool = True) -> tuple[Rig, Change]:
+def changed(rig: Rig, overrides: Sequence[str], *, repeated: bool = False) -> tuple[Rig, Change]:
     """Check overrides of a running rig; return the new rig and the change to apply.
 
     Parameters
@@ -64,9 +64,10 @@ def changed(rig: Rig, overrides: Sequence[str], *, variation: bool = True) -> tu
         As it runs.
     overrides
         `key=value` in dotted form.
-    variation
-        Whether to work out the variation that is expected of the voltage. That evaluates the reference, and
-        so reads the file of one: a replay judges no variation, and must not read what a recording names.
+    repeated
+        Whether a replay repeats the change. Its references are the recorded ones, so that none is beyond
+        reach; and it judges no variation of the voltage. To work out what variation is expected evaluates
+        the reference, and so reads the file of one: a replay must not read what a recording names.
 
     Returns
     -------
@@ -94,9 +95,9 @@ def changed(rig: Rig, overrides: Sequence[str], *, variation: bool = True) -> tu
             "Another class, or one of your own, takes the place of no other in a run. "
             "Start another run with it."
         )
-    if after.reference != rig.reference and (faults := beyond_reach(after)):
+    if not repeated and after.reference != rig.reference and (faults := beyond_reach(after)):
         raise ConfigError(*faults)
-    return after, _worked_out(rig, after, variation=variation)
+    return after, _worked_out(rig, after, variation=not repeated)
 
 
 def doubts(before: Rig, after: Rig) -> list[str]:

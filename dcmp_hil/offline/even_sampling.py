@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -110,25 +111,25 @@ def _told(time: Column, period: float, name: str, notes: list[str]) -> Column:
     late = 2.0 * float(np.quantile(np.abs(steps - np.median(steps)), 0.9))
     resolution = max(late, float(np.quantile(steps[steps > 0.0], 0.95)) if repeated else 0.0)
     few = time[-1] - time[0] < _STAMPS_MIN * resolution
-    number = _numbered(time, period, resolution)
-    off = time - period * number
-    grid = _Grid(number, period, float(np.ptp(off))) if few else _fit(time, resolution, period)
+    numbers = _numbered(time, period, resolution)
+    off = time - period * numbers
+    grid = _Grid(numbers, period, float(np.ptp(off))) if few else _fit(time, resolution, period)
     if abs(grid.period / period - 1.0) > _PERIOD_TOLERANCE_SHARE:
         raise ConfigError(
-            f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {period:g} s. Leave "
-            "--period out, or say --time none: then the stamps do not count."
+            f"{name}: by the stamps the rows are {grid.period:.4g} s apart, by --period {number(period)} s. "
+            "Leave --period out, or say --time none: then the stamps do not count."
         )
     if grid.spread > resolution + grid.period:
         if repeated >= _REPEATED_STAMPS_SHARE_MAX * len(time):
             raise ConfigError(
-                f"{name}: by the stamps the rows are not evenly sampled, {period:g} s apart: they differ "
-                f"from that by {grid.spread:.4g} s. Say --time none if the stamps do not count."
+                f"{name}: by the stamps the rows are not evenly sampled, {number(period)} s apart: they "
+                f"differ from that by {grid.spread:.4g} s. Say --time none if the stamps do not count."
             )
         notes.append("The rows are not evenly sampled: the stamps are taken; --period tunes the observer.")
         return _spread(time)
     lost = int(grid.number[-1]) - len(time) + 1
     told = "no lost row" if not lost else "1 lost row" if lost == 1 else f"{lost} lost rows"
-    notes.append(f"Evenly sampled, {period:g} s (--period); the stamps show {told}.")
+    notes.append(f"Evenly sampled, {number(period)} s (--period); the stamps show {told}.")
     return grid.number * period
 
 

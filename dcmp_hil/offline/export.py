@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _INPUT_COLUMN = {"torque": "torque_N_m", "voltage": "voltage_V", "none": "voltage_V"}
 _ESTIMATE_COLUMNS = ("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2")
+_REFERENCE_COLUMN = "disturbance_reference_rad_s2"
 _NONE_COMPARED: Mapping[str, ReplayResult] = MappingProxyType({})
 _APPLICATION_ID = "dcmp-hil replay"
 
@@ -36,7 +37,7 @@ def columns(
         The replay.
     compared
         Other replays of the same recording: their estimates follow, with `_compare1`, `_compare2` ... behind
-        the name of each column.
+        the name of each column; and the reference of the disturbance where another model has another one.
 
     Returns
     -------
@@ -52,15 +53,15 @@ def columns(
         _INPUT_COLUMN[recording.input_kind]: result.applied,
         **dict(zip(_ESTIMATE_COLUMNS, estimates, strict=True)),
         "velocity_reference_rad_s": result.reference.velocity,
-        "disturbance_reference_rad_s2": result.reference.disturbance,
+        _REFERENCE_COLUMN: result.reference.disturbance,
     }
     if recording.velocity is not None:
         table["velocity_given_rad_s"] = recording.velocity
     for number, other in enumerate(compared.values(), start=1):
-        names = ("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2")
-        table |= {
-            f"{name}_compare{number}": values for name, values in zip(names, other.estimates, strict=True)
-        }
+        further = dict(zip(_ESTIMATE_COLUMNS, other.estimates, strict=True))
+        if other.has_other_reference(result):
+            further[_REFERENCE_COLUMN] = other.reference.disturbance
+        table |= {f"{name}_compare{number}": values for name, values in further.items()}
     return table
 
 
@@ -131,6 +132,8 @@ def write_rrd(
     for label, other in compared.items():
         for entity, values in zip(plots, other.estimates, strict=False):  # all but the input
             plots[entity][label] = values
+        if other.has_other_reference(result):
+            plots["joint/disturbance_rad_s2"][f"reference of {label}"] = other.reference.disturbance
     try:
         with whole_file(path) as place:
             try:

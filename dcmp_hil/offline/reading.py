@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.cells import clock_times, is_clock, numbers
 from dcmp_hil.offline.column_choice import choose
@@ -162,7 +163,7 @@ def _time(
                 f'{table.path}: "{column.column}" rises by one from row to row, so it numbers the samples. '
                 "Say how far apart they are: --period T, in seconds (or --time-unit, if it is a time)."
             )
-        notes.append(f'"{column.column}" numbers the samples, {options.period:g} s apart (--period).')
+        notes.append(f'"{column.column}" numbers the samples, {number(options.period)} s apart (--period).')
         numbered = column._replace(unit="samples", size=options.period, source="values")
         return stamps, columns._replace(time=numbered), None
     return stamps, columns, options.period
@@ -212,7 +213,7 @@ def _stamps(
 ) -> Stamps:
     if values.time is None or columns.time is None:
         period = options.period or math.nan
-        said = f"Evenly sampled, {period:g} s (--period); the file's own time, if any, does not count."
+        said = f"Evenly sampled, {number(period)} s (--period); the file's own time, if any, does not count."
         # A row that was left out is a step that is longer.
         return Stamps(period * known.astype(np.float64), np.arange(len(known)), (), (said,))
     rows = [table.rows[row] for row in known.tolist()]

@@ -59,6 +59,11 @@ class ReplayResult:
     figures: Figures
     notes: tuple[str, ...]
 
+    def has_other_reference(self, other: ReplayResult) -> bool:
+        """Return whether its disturbance is judged by another reference: that of another f0 or ku."""
+        now, then = self.reference.disturbance, other.reference.disturbance
+        return not np.array_equal(now, then, equal_nan=True)
+
 
 def replay(recording: LoggedSignals, settings: ReplaySettings | None = None) -> ReplayResult:
     """Run an observer over a recording with the measured steps.
@@ -80,6 +85,16 @@ def replay(recording: LoggedSignals, settings: ReplaySettings | None = None) -> 
         missing, or nothing is left to judge.
     """
     settings = settings or ReplaySettings()
+    try:
+        return _replayed(recording, settings)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise ConfigError(
+            f"{recording.name}: its numbers, or the gains, are beyond what the observer can compute with "
+            f"({error}). Check the units, or write usual gains."
+        ) from None
+
+
+def _replayed(recording: LoggedSignals, settings: ReplaySettings) -> ReplayResult:
     set_up = prepare(recording, settings)
     period, gap = set_up.setting.period, _RESTART_PERIODS * set_up.setting.period
     begins = recording.begins(gap)

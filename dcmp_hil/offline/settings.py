@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from dcmp_hil.common.number_range import NumberRange
+from dcmp_hil.common.number_range import NumberRange, number
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.model import Model
@@ -23,6 +23,7 @@ _CURRENT_FOLDER = Path()
 PERIOD_RANGE = NumberRange(1e-6, 10.0)
 """s, of a nominal sampling period."""
 _COUNTS_RANGE = NumberRange(4.0, 1e9)  # a revolution
+_F0_MAX_1_S, _KU_MAX_RAD_S2_V = 100.0, 1e4  # as of [model]
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
 
@@ -60,10 +61,10 @@ class ReplaySettings:
     """Encoder counts a revolution, for the rule of mu0; None estimates it from the recording."""
     period: float | None = None
     """Nominal sampling period T, s; None takes the median step."""
-    L1: float = 4.9
-    """Copy gain, 1/s."""
-    L2: float = 5.51
-    """Copy gain, 1/s2."""
+    L1: float | None = None
+    """Copy gain, 1/s; None: the observer's own default, 4.9 in those of the package."""
+    L2: float | None = None
+    """Copy gain, 1/s2; None: the observer's own default, 5.51 in those of the package."""
     M: float | None = None
     """Differentiator gain, rad/s3; None: 15 (1000 for an ideal encoder) in super_twisting, 1000 in paper."""
     mu0: float | None = None
@@ -76,7 +77,7 @@ class ReplaySettings:
     def __post_init__(self) -> None:
         """Check every number against its range."""
         faults = [
-            f"{option}: got {value:g}; expected {allowed.words(unit)}. {remedy}"
+            f"{option}: got {number(value)}; expected {allowed.words(unit)}. {remedy}"
             for option, value, unit, allowed, remedy in self._ranges()
             if not allowed.holds(value)
         ]
@@ -115,14 +116,14 @@ class ReplaySettings:
             split_named(self.observer, "--observer", known)
             return Custom.model_construct(kind=self.observer, options=self.observer_options)
         table = known[self.observer]
-        start = "zero" if self.from_zero else "measured"
         gains = {
             "L1_1_s": self.L1,
             "L2_1_s2": self.L2,
             "M_rad_s3": self.M,
             "mu0_rad_s": self.mu0,
-            "start": start,
+            "start": "zero" if self.from_zero else None,
         }
+        # What is not set is left to the kind: it may have a default of its own under the same name.
         keys = {key: value for key, value in gains.items() if key in table.model_fields and value is not None}
         return cast("ObserverSection", table.model_validate({"kind": self.observer, **keys}))
 
@@ -131,9 +132,21 @@ class ReplaySettings:
         counts = None if self.counts_per_rev == IDEAL else self.counts_per_rev
         of_M = NumberRange(0.0, 1e9, low_excluded=self.observer == "paper")
         rows: list[tuple[str, float | str | None, str, NumberRange, str]] = [
-            ("--f0", self.f0, "1/s", NumberRange(0.0, 1e3), "It is the viscous friction over the inertia."),
+            (
+                "--f0",
+                self.f0,
+                "1/s",
+                NumberRange(0.0, _F0_MAX_1_S),
+                "It is the viscous friction over the inertia.",
+            ),
             ("--inertia", self.inertia, "kg m2", _above_zero(1e6), "Give J in kg m2."),
-            ("--ku", self.ku, "(rad/s2)/V", _above_zero(1e6), "It is ku/J, the acceleration of one volt."),
+            (
+                "--ku",
+                self.ku,
+                "(rad/s2)/V",
+                _above_zero(_KU_MAX_RAD_S2_V),
+                "It is ku/J, the acceleration of one volt.",
+            ),
             ("--counts-per-rev", counts, "", _COUNTS_RANGE, "Give the counts after quadrature, or ideal."),
             ("--period", self.period, "s", PERIOD_RANGE, "Leave it out to take the median step."),
             ("--L1", self.L1, "1/s", _above_zero(1e4), "The paper's is 4.9."),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.even_sampling import even_rows
 
@@ -92,7 +93,7 @@ def rising(raw: Column, size: float, copies: NDArray[np.bool_], period: float | 
         notes.append("The rows come in reverse order of their time: read from the last one on.")
     steps = np.diff(raw)
     if not (steps > 0.0).any() and period is not None and not steps.any():
-        notes.append(f"Evenly sampled, {period:g} s (--period); all stamps are the same.")
+        notes.append(f"Evenly sampled, {number(period)} s (--period); all stamps are the same.")
         return Stamps(period * rows.astype(np.float64), rows, (), tuple(notes))
     if not (steps > 0.0).any():
         raise ConfigError(

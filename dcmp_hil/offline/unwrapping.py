@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.common.number_range import number
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline.units import COUNTS
 
@@ -112,7 +113,7 @@ def continuous(
     notes: list[str] = []
     if isinstance(modulus, float) and np.ptp(raw) > modulus * (1.0 + 1e-6):
         raise ConfigError(
-            f"--modulus {modulus:g}: the position spans {np.ptp(raw):g}, more than it. "
+            f"--modulus {number(modulus)}: the position spans {np.ptp(raw):g}, more than it. "
             "Give the number of values before it wraps, in the unit of the column, or leave it out."
         )
     chosen = _found(raw, steps, inside, known) if modulus is None else modulus

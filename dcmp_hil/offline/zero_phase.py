@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 _FILTER_ORDER = 3
 _FREQUENCY_MAX_PER_SAMPLE = 0.45
 """Cycles per sample: below 0.5 by more than the steps of a grid differ from the period."""
+_FREQUENCY_MIN_PER_SAMPLE = 1e-7
+"""Cycles per sample: below it, rounding moves the poles of the filter."""
 _PADDING_PERIODS = 2.0  # periods of the corner: what the slowest pole leaves after them is 0.2 %
 _PADDING_SAMPLES_MIN = 4 * _FILTER_ORDER  # samples, what scipy takes
 
@@ -71,8 +73,13 @@ def zero_phase(
     Raises
     ------
     ConfigError
-        If scipy is missing, or the sampling is too slow for the corner.
+        If scipy is missing, or the sampling is too slow or too fast for the corner.
     """
+    if cutoff * period < _FREQUENCY_MIN_PER_SAMPLE:
+        raise ConfigError(
+            f"A corner of {cutoff:g} Hz is too low for a usual step of {period:g} s. Write --cutoff "
+            f"{_FREQUENCY_MIN_PER_SAMPLE / period:.3g} or more; the usual one is 15 Hz."
+        )
     if cutoff * period > _FREQUENCY_MAX_PER_SAMPLE:
         raise ConfigError(
             f"A usual step of {period:g} s ({1.0 / period:.4g} Hz) is too slow for a reference of {cutoff:g} "

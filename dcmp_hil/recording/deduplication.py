@@ -45,8 +45,8 @@ class Gap(NamedTuple):
         return f"{many}, device time {start} to {stop}"
 
 
-class Ordered(NamedTuple):
-    """The rows of a recording in order, without duplicates.
+class OrderedContents(NamedTuple):
+    """The rows and events of a recording in order, without duplicates.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def in_order(
     periods: int | None,
     events: int | None,
     event_of: Callable[[Mapping[str, Any]], Event],
-) -> Ordered:
+) -> OrderedContents:
     """Return cycles and events in the order of their numbers.
 
     Parameters
@@ -100,7 +100,7 @@ def in_order(
             faults.append("its blocks stand in another order than they were written in")
         rows, numbers = rows[first], numbers[first]
     kept = _events(_parsed(messages, event_of, faults), began_ns, events, faults)
-    return Ordered(rows, kept, _gaps(rows[:, 0], numbers.astype(np.int64), periods), tuple(faults))
+    return OrderedContents(rows, kept, _gaps(rows[:, 0], numbers.astype(np.int64), periods), tuple(faults))
 
 
 def _parsed(

@@ -129,7 +129,7 @@ def _opened(path: str, flags: int) -> int:
 
 
 def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
-    found = _Found()
+    found = _FileContents()
     scanner = Scanner(file, size)
     for piece in scanner:
         if isinstance(piece, Damage):
@@ -152,7 +152,9 @@ def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
     )
 
 
-def _told(found: _Found, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[Gap, ...]) -> tuple[str, ...]:
+def _told(
+    found: _FileContents, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[Gap, ...]
+) -> tuple[str, ...]:
     """Return what is wrong, a sentence each, the time spans first."""
     told = [str(gap) for gap in gaps]
     told += [f"bytes {one.at} to {one.end} are left out: {one.why}" for one in found.damage]
@@ -168,7 +170,7 @@ def _told(found: _Found, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[
     return (*told[:_SENTENCES_MAX], f"and {more} more of the kind") if more > 0 else tuple(told)
 
 
-def _rig(path: Path, found: _Found, run: dict[str, str]) -> Rig:
+def _rig(path: Path, found: _FileContents, run: dict[str, str]) -> Rig:
     """Return the rig, which finds its classes where the run did as long as both lie as they lay then."""
     table = found.attached(RIG)
     if not isinstance(table, dict):
@@ -187,7 +189,7 @@ def _rig(path: Path, found: _Found, run: dict[str, str]) -> Rig:
     return rig.in_folder(path.parent / run["rig_folder"]) if "rig_folder" in run else rig
 
 
-class _Found:
+class _FileContents:
     """Contents of a recording's file, before they are put in order."""
 
     def __init__(self) -> None:

@@ -19,11 +19,11 @@ from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.plugins.checked import failure_of
 from dcmp_hil.recording.recorded_changes import changes_in
 from dcmp_hil.recording.replay_backend import (
-    Outcomes,
     RecordedSupervisor,
     RecordedTrajectory,
     RepeatedChanges,
     ReplayBackend,
+    ReplayTelemetry,
 )
 from dcmp_hil.recording.untrusted import UnreadTable, check_numbers, refuse_named
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
@@ -31,12 +31,13 @@ from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.values import EventKind
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
     from dcmp_hil.recording.reader import RecordedRun
+    from dcmp_hil.recording.recorded_changes import UnrepeatedChange
     from dcmp_hil.values import Event
 
 
@@ -50,16 +51,22 @@ class Reexecution:
         Position, velocity, disturbance in SI units, shape (n, 3).
     demand
         V, shape (n,).
+    unrepeated
+        Changes that were made in the run, and not in this repetition.
     """
 
     estimate: NDArray[np.float64]
     demand: NDArray[np.float64]
+    unrepeated: tuple[UnrepeatedChange, ...] = ()
 
 
-def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = False) -> Reexecution:
+def reexecute(
+    recorded: RecordedRun, rig: Rig | None = None, *, pinned: Collection[str] = (), trust: bool = False
+) -> Reexecution:
     """Run the loop over a recording: its samples, references and voltages are as they were.
 
-    Changes that were made while it went on are made again, in the same cycle.
+    Changes that were made while it went on are made again, in the same cycle. What cannot be made with this
+    rig, and what was changed of a pinned key, is left out, and is in `unrepeated`.
 
     What was measured stays as it was: a controller that asks for something else does not move this arm.
 
@@ -69,6 +76,8 @@ def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
         The run.
     rig
         Another observer or controller; None takes those of the run.
+    pinned
+        Dotted keys that keep what `rig` says; what the run changed them to is left out.
     trust
         Whether what the recording itself names may be imported, or read: classes, a reference's file.
 
@@ -87,19 +96,22 @@ def reexecute(recorded: RecordedRun, rig: Rig | None = None, *, trust: bool = Fa
         source = UnreadTable(recorded.path, rig.reference)
     trajectory = Trajectory(source, rig.reference.soft_start_s)
     try:
-        return _reexecute(recorded, rig, trajectory)
+        return _reexecute(recorded, rig, trajectory, pinned)
     except (ArithmeticError, ValueError) as error:
         raise ConfigError(
             f"{recorded.path}: its numbers are beyond what observer and controller can take ({error})."
         ) from None
 
 
-def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexecution:
-    backend, outcomes = ReplayBackend(recorded.rows), Outcomes()
+def _reexecute(
+    recorded: RecordedRun, rig: Rig, trajectory: Trajectory, pinned: Collection[str]
+) -> Reexecution:
+    backend, outcomes = ReplayBackend(recorded.rows), ReplayTelemetry()
     observer, controller = make_observer(rig), make_controller(rig)
     mailbox = Mailbox()
     changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_ignore_event)
-    made = changes_in(recorded.events, rig, whole=not recorded.damage)
+    found = changes_in(recorded.events, rig, pinned)
+    repeated = RepeatedChanges(found.made, mailbox, changes)
     stages = loop.LoopStages(
         backend=backend,
         outlier_filter=OutlierFilter(math.inf, rig.period, rig.encoder.count),  # outliers are missing already
@@ -112,11 +124,15 @@ def _reexecute(recorded: RecordedRun, rig: Rig, trajectory: Trajectory) -> Reexe
         deadline_monitor=DeadlineMonitor(rig.period),
         clock=SimulatedClock(),
         delay=rig.delay,
-        changes=RepeatedChanges(made, mailbox, changes),
+        changes=repeated,
         friction=make_friction(rig),
     )
     _run(stages, backend, [event.t for event in recorded.events if event.kind is EventKind.LOWERING])
-    again = Reexecution(np.array(outcomes.estimates, float).reshape(-1, 3), np.array(outcomes.demands, float))
+    again = Reexecution(
+        np.array(outcomes.estimates, float).reshape(-1, 3),
+        np.array(outcomes.demands, float),
+        (*found.unrepeated, *repeated.refused),
+    )
     _check_own(again, observer, controller)
     return again
 

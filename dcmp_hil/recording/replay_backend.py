@@ -6,7 +6,9 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, Self
 
+from dcmp_hil.ipc.mailbox import APPLIED
 from dcmp_hil.ipc.ring import FIELDS
+from dcmp_hil.recording.recorded_changes import UnrepeatedChange
 from dcmp_hil.values import Reference, Sample, Truth
 
 if TYPE_CHECKING:
@@ -148,19 +150,31 @@ class RepeatedChanges:
         Where they are put.
     changes
         Takes them from there.
+
+    Attributes
+    ----------
+    refused
+        What observer, controller or trajectory could not apply.
     """
 
     def __init__(self, made: Iterable[tuple[float, Change]], mailbox: Mailbox, changes: LiveChanges) -> None:
         self._made, self._mailbox, self._changes = deque(made), mailbox, changes
+        self.refused: list[UnrepeatedChange] = []
 
     def apply(self, t: float) -> None:
         """Make the change of this cycle: later where the cycle itself is missing."""
-        if self._made and self._made[0][0] <= t:
-            self._mailbox.put(self._made.popleft()[1])
+        if not (self._made and self._made[0][0] <= t):
+            self._changes.apply(t)
+            return
+        was, change = self._made.popleft()
+        number = self._mailbox.put(change)
         self._changes.apply(t)
+        answer = self._mailbox.answer(number)
+        if answer is None or answer.what != APPLIED:
+            self.refused.append(UnrepeatedChange(was, change.values, "refused", "It could not be applied."))
 
 
-class Outcomes:
+class ReplayTelemetry:
     """Telemetry of a repetition: estimates and demands, cycle by cycle.
 
     Attributes

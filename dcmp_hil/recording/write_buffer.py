@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     last: int
 
 
-class Backlog:
+class WriteBuffer:
     """A stream for a writer that never fails; `put` writes what it was given, in whole pieces.
 
     Parameters

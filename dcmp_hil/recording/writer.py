@@ -29,7 +29,7 @@ from dcmp_hil.recording.schema import (
     event_to_bytes,
     to_bytes,
 )
-from dcmp_hil.recording.write_buffer import Backlog
+from dcmp_hil.recording.write_buffer import WriteBuffer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -85,7 +85,7 @@ class RecordingSink:
         period: float,
         run: Mapping[str, str],
         rig: str,
-        open_file: Callable[[Path], Backlog] = Backlog,
+        open_file: Callable[[Path], WriteBuffer] = WriteBuffer,
     ) -> None:
         self._path = path
         self._began_ns = int(utc_now().timestamp() * 1e9)  # of device time 0, near enough for a log

@@ -146,13 +146,16 @@ class TelemetryProcess:
         except OSError as error:
             self._go_without(f"could not be started ({error})")
             return
-        answer = self._wait_until_up(child, stopped)
-        if answer == UP:
-            self._child, self.pid = child, child.pid
-            self._send_events()
-            return
-        child.hang_up()
-        child.end(0.0)
+        try:
+            answer = self._wait_until_up(child, stopped)
+            if answer == UP:
+                self._child, self.pid = child, child.pid
+                self._send_events()
+                return
+        finally:
+            if self._child is None:  # also where Ctrl-C interrupts the wait
+                child.hang_up()
+                child.end(0.0)
         if answer:
             raise ConfigError(*pickle.loads(answer))  # noqa: S301 - written by our own child
         if not stopped():

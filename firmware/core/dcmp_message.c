@@ -8,7 +8,7 @@ struct layout {
     bool from_host;
 };
 
-/* By message number, the identifier of node 0 divided by 16. */
+/* By message number, the identifier of node 0 divided by 16; a number without a message has length 0. */
 static const struct layout layouts[] = DCMP_LAYOUTS;
 
 /* Over the identifier too: a frame whose identifier was damaged is not taken for another message. */
@@ -25,7 +25,7 @@ static uint8_t checksum(const struct dcmp_frame *frame)
 enum dcmp_checked dcmp_check_any(const struct dcmp_frame *frame, uint8_t node)
 {
     const size_t number = frame->id >> 4;
-    if ((frame->id & 0xFu) != node || number == 0u || number >= sizeof layouts / sizeof layouts[0]) {
+    if ((frame->id & 0xFu) != node || number >= sizeof layouts / sizeof layouts[0] || layouts[number].length == 0u) {
         return DCMP_FOREIGN;
     }
     if (frame->length != layouts[number].length) {

@@ -91,6 +91,15 @@ enum dcmp_result {
     {7, false},  /* HEALTH */ \
 }
 
+/* Identifiers, of node 0, of the messages that the host sends. */
+#define DCMP_FROM_HOST { \
+    DCMP_STOP, \
+    DCMP_DRIVE, \
+    DCMP_HELLO, \
+    DCMP_PARAMETER_GET, \
+    DCMP_PARAMETER_SET \
+}
+
 /* STOP: stop now; obeyed from every host, in any session. */
 struct dcmp_stop {
     uint8_t reason; /* Reason for a STOP. */

@@ -3,9 +3,9 @@
 #include "dcmp_guard.h"
 #include "dcmp_protocol_hash.h"
 
-static void answer(struct dcmp_device *device, const struct dcmp_answer *answer)
+static void answer(struct dcmp_device *device, const struct dcmp_answer *said)
 {
-    if (!dcmp_transmit_answer(&device->transmit, answer)) {
+    if (!dcmp_transmit_answer(&device->transmit, said)) {
         dcmp_health_count(&device->health.report.ring_overruns);
     }
 }

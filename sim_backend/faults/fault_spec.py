@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sim_backend.faults.fault_model import FaultContext, Number, RigFacts
 from sim_backend.faults.firmware import FIRMWARE
 from sim_backend.faults.host import HOST
-from sim_backend.faults.parser import WrongFaultError, check, parse
+from sim_backend.faults.parser import WrongFaultError, check, parse, unknown_parameter
 from sim_backend.faults.plant import PLANT
 from sim_backend.faults.wire import WIRE
 
@@ -48,7 +48,7 @@ class FaultSpec:
     def __init__(self, kind: str, at: When = 0, for_: float = math.inf, **params: Value) -> None:
         parse(kind, KINDS)
         known = KINDS[kind].params
-        faults = [f'{kind}: "{name}" is no parameter.' for name in params if name not in known]
+        faults = [f"{kind}: {unknown_parameter(name, known)}" for name in params if name not in known]
         self.kind, self.at, self.for_ = kind, at, for_
         self.params: dict[str, Value] = {}
         for name, param in known.items():

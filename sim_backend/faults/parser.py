@@ -56,7 +56,7 @@ def _value(key: str, text: str, kind: Kind) -> Value:
     if key in ("at", "for"):
         return _time(key, text)
     if key not in kind.params:
-        raise ValueError(f'"{key}" is no parameter. {_meant(key, [*kind.params, "at", "for"])}')
+        raise ValueError(unknown_parameter(key, [*kind.params, "at", "for"]))
     param = kind.params[key]
     if not isinstance(param, Number):
         return text if text in param.words else check(key, text, param)
@@ -104,6 +104,11 @@ def check(key: str, value: Value, param: Number | Choice) -> Value:
     if isinstance(value, str) or not param.allowed.holds(value):
         raise ValueError(f"{key}: got {value}; expected {param.allowed.words(param.unit)}.")
     return value
+
+
+def unknown_parameter(got: str, known: Iterable[str]) -> str:
+    """Return in words that a fault has no such parameter, and which it has."""
+    return f'"{got}" is no parameter. {_meant(got, known)}'
 
 
 def _meant(got: str, known: Iterable[str]) -> str:

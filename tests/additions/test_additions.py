@@ -52,6 +52,15 @@ _FAULT = '''class Weak(HostFault):
 
 
 '''
+_PLANT = '''class PushedPlant(MoreauPlant):
+    """An arm that a constant torque pushes."""
+
+    def advance(self, voltage: float) -> Truth:
+        """Hold `voltage` and one volt more for one period."""
+        return super().advance(voltage + 1.0)
+
+
+'''
 _SIGNAL = '    Signal("asked_V", "control/asked_V", "asked", ERROR_RGB, lambda b: b["voltage_demand"]),\n'
 ADDITIONS = {
     "observer": Addition(
@@ -81,6 +90,17 @@ ADDITIONS = {
                 "dcmp_hil/telemetry/signals.py",
                 "SIGNALS = (\n",
                 _SIGNAL,
+            ),
+        ),
+    ),
+    "plant": Addition(
+        {},
+        (
+            ("sim_backend/plant.py", "def make_plant", _PLANT),
+            (
+                "dcmp_hil/config/sections.py",
+                '"friction that can stick"),\n',
+                '    "pushed": ("sim_backend.plant:PushedPlant", "a constant torque"),\n',
             ),
         ),
     ),

@@ -18,6 +18,7 @@ from dcmp_hil.offline import ReplaySettings
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.telemetry.signals import by_plot
 from sim_backend.faults.fault_spec import FaultSpec
+from sim_backend.plant import make_plant
 from tests.contract.benches import PUMPED, WIRED, on_bench
 
 _SHORT = {"duration": 1.5, "fast": True}
@@ -51,6 +52,11 @@ def _weak() -> list[float]:
     )
     demands = [one.columns["voltage_demand_V"] for one in (with_it, without)]
     return [round(float(demands[0][place] / demands[1][place]), 3) for place in (999, 1000)]
+
+
+def _pushed() -> float:
+    """Return the angle of a resting arm after one period at 0 V, rad."""
+    return make_plant(load_rig("bench-1khz", ["sim.integrator=pushed"])).advance(0.0).position
 
 
 _WIRED_RIG = ("backend.kind=tcp", "backend.tcp_port=5000", "supervisor.probe=off")
@@ -89,6 +95,7 @@ def main() -> None:
             "control/asked_V" in by_plot(),
             len(plain.columns["asked_V"]) == len(plain.columns["time_s"]),
         ],
+        "plant": [_pushed() > 0.0, "`pushed`: a constant torque" in schema],
         "fault": [_weak() == [1.0, 0.5]],
     }
     sys.stdout.write(json.dumps(found))

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.cli.recording_check import kept_in, space_warning
+from dcmp_hil.cli.recording_check import check_recording, space_warning
 from dcmp_hil.errors import IncompleteError
 from dcmp_hil.recording.completeness import ending_of
 from dcmp_hil.recording.metadata import about, rig_json
 from dcmp_hil.recording.reader import read_run
-from dcmp_hil.recording.write_buffer import Backlog
+from dcmp_hil.recording.write_buffer import WriteBuffer
 from dcmp_hil.recording.writer import RecordingSink
 from tests.helpers import bench
 from tests.namespaces import on_disk_of
@@ -69,11 +69,11 @@ class _Disk:
         self._full = full
         self.frees_at_the_end = False
 
-    def open(self, path: Path, room: int) -> Backlog:
-        backlog = Backlog(path, room)
-        backlog._file.close()  # noqa: SLF001
-        backlog._file = _Fickle(path, self)  # type: ignore[assignment] # noqa: SLF001
-        return backlog
+    def open(self, path: Path, room: int) -> WriteBuffer:
+        buffer = WriteBuffer(path, room)
+        buffer._file.close()  # noqa: SLF001
+        buffer._file = _Fickle(path, self)  # type: ignore[assignment] # noqa: SLF001
+        return buffer
 
     def takes(self, size: int) -> int:
         if not self.frees_at_the_end and self._chance.random() < self._full:
@@ -117,7 +117,7 @@ def test_moments_of_a_full_disk_cost_nothing(tmp_path: Path, seed: int) -> None:
     assert read.complete
     assert read.rows.tobytes() == rows.tobytes()
     assert read.events == EVENTS
-    assert kept_in(path, len(rows), wait=False).complete
+    assert check_recording(path, len(rows), wait=False).complete
     assert not any("misses" in sentence for sentence in sink.warnings)
 
 
@@ -140,7 +140,7 @@ def test_what_a_full_disk_costs_is_told_with_its_time(tmp_path: Path, seed: int)
     for (start, stop, _), gap in zip(ending.missing, read.gaps, strict=True):
         assert any(f"{start:.6g} s to {stop:.6g} s" in sentence for sentence in told) or len(told) > 1
         assert gap.start is None or gap.start <= start
-    kept = kept_in(path, len(rows), wait=False)
+    kept = check_recording(path, len(rows), wait=False)
     assert not kept.complete
     assert kept.periods == len(there)
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.cli.conftest import Outcome
+    from tests.installed import Finished
 
     Cli = Callable[..., Outcome]
 
@@ -76,6 +77,8 @@ def test_each_variant_of_a_file_is_what_set_gives_alone(cli: Cli, recording: str
     assert [other.pop("set") for other in others] == ["; ".join(keys) for keys in VARIANTS.values()]
     for number, (other, keys) in enumerate(zip(others, VARIANTS.values(), strict=True), start=1):
         alone = figures(cli, recording, *sets(keys), "--csv", str(csv_file))
+        own = [note for note in other.pop("notes") if note not in alone["notes"]]
+        assert len(own) == ("model" in keys[0])  # another model has another reference
         assert other.items() <= alone.items()
         assert other["velocity_error_rms_rad_s"] != plain["velocity_error_rms_rad_s"]
         for name in ("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2"):
@@ -96,6 +99,7 @@ def test_each_variant_of_a_run_is_what_set_gives_alone(cli: Cli, run: str, tmp_p
     for number, (other, keys) in enumerate(zip(others, variants.values(), strict=True), start=1):
         alone = figures(cli, run, *sets(keys), "--csv", str(csv_file))
         assert other.pop("identical") is alone["identical"] is False
+        assert other.pop("unrepeated_changes") == alone["unrepeated_changes"] == []
         assert other == {name: line["again"] for name, line in alone.items() if isinstance(line, dict)}
         for name in ("velocity_estimate_rad_s", "disturbance_estimate_rad_s2", "voltage_demand_V"):
             assert together[f"{name}_compare{number}"] == columns(csv_file)[f"{name}_again"]
@@ -142,6 +146,38 @@ def test_a_variant_that_cannot_be_is_refused(
     outcome = cli("replay", source, "--no-write", *options(dict.fromkeys(arguments, ())))
     assert (outcome.code, outcome.out) == (2, "")
     assert says in outcome.err.replace("\n", " ")
+
+
+def test_another_model_is_judged_by_a_reference_that_the_files_hold(
+    script: Callable[..., Finished], recording: str, tmp_path: Path
+) -> None:
+    models = ("f0=0.5", "ku=6", "L1=6")
+    variants = [word for key in models for word in ("--compare", key)]
+    outputs = ("--csv", "o.csv", "--rrd", "o.rrd", "--json", "o.json")
+    done = script("replay", recording, "--ku", "5.4", *variants, *outputs, cwd=tmp_path)
+    assert done.code == 0, done.err
+    compared = json.loads((tmp_path / "o.json").read_text())["compared"]
+    table = {name: np.array(cells, float) for name, cells in columns(tmp_path / "o.csv").items()}
+    judged = table["time_s"] - table["time_s"][0] > 0.3 + 1e-6
+    names = [name for name in table if name.startswith("disturbance_reference")]
+    assert [name.partition("rad_s2")[2] for name in names] == ["", "_compare1", "_compare2"]
+    u, v = table["voltage_V"], table["velocity_reference_rad_s"]
+    u = 0.5 * (u + np.append(u[1:], u[-1]))  # around a row
+    for number, variant in enumerate(compared, start=1):
+        own = table.get(f"disturbance_reference_rad_s2_compare{number}", table[names[0]])
+        error = (table[f"disturbance_estimate_rad_s2_compare{number}"] - own)[judged]
+        rms = float(np.sqrt(np.mean(error**2)))
+        assert variant["disturbance_error_rms_rad_s2"] == pytest.approx(rms, rel=1e-6)
+        said = f"{variant['set']}: The disturbance is judged by a reference with the model of this variant"
+        assert (
+            (said in done.err)
+            == (number < len(models))
+            == any("model of this variant" in note for note in variant["notes"])
+        )
+    f0, ku = (table[name] - table[names[0]] for name in names[1:])
+    assert f0[judged] == pytest.approx((0.4 * v)[judged], abs=1e-6)  # x'' + f0 x' - u: by its definition
+    assert np.corrcoef(ku[judged], -u[judged])[0, 1] > 0.95  # u is filtered in it
+    assert values(tmp_path / "o.rrd", "joint/disturbance_rad_s2").shape[1] == 2 + len(models) + 2
 
 
 def test_a_controller_is_compared_over_a_run_only(cli: Cli, recording: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 import secrets
 from typing import TYPE_CHECKING
 
@@ -96,6 +97,13 @@ def test_wrong_text_is_refused_with_a_remedy(text: str, says: str) -> None:
     with pytest.raises(ConfigError, match=r"^--fault") as caught:
         inject(bench(BOARD), [text], "--fault")
     assert says in str(caught.value)
+
+
+def test_unknown_parameter_of_the_constructor_is_answered_with_the_known_ones() -> None:
+    with pytest.raises(WrongFaultError, match=re.escape('"burts" is no parameter. Did you mean "burst"?')):
+        FaultSpec("wire.drop", burts=1)
+    with pytest.raises(WrongFaultError, match=re.escape('"xyzzy" is no parameter. Known: p, burst')):
+        FaultSpec("wire.drop", xyzzy=1)
 
 
 def test_every_wrong_fault_is_named_at_once() -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import pytest
+from pydantic import Field
 
+from dcmp_hil.common.section import NotNegative, Positive, Section
 from dcmp_hil.config.rig import Rig
+from dcmp_hil.config.rules import within_reason
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.tunable_ranges import tunable_descriptions
+from dcmp_hil.live.tunable_ranges import slider_range, tunable_descriptions
 from dcmp_hil.live.tunables import changed, settable
 from tests.helpers import bench, named
 
@@ -106,3 +109,37 @@ def test_knobs_are_what_is_settable_and_within_what_is_allowed(kind: str) -> Non
         assert start > 0.0 or not knob["decades"]
         for value in (start, end, knob["low"], knob["high"]):
             changed(rig, [f"{knob['key']}={value}"])
+
+
+class _WithoutRows(Section):
+    """Keys of a stage of a user, none of which the table of sliders knows."""
+
+    gain_V_rad: NotNegative = 40.0
+    time_constant_s: Positive = 0.5
+    share: Annotated[float, Field(ge=0, le=1)] = 0.3
+    turn_rad: float = 0.2
+    drift_rad_s: float = 2.0
+    bias_V: float = 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("gain_V_rad", (0.0, 400.0)),
+        ("time_constant_s", (0.05, 5.0)),
+        ("share", (0.0, 1.0)),
+        ("turn_rad", (-3.0, 3.0)),
+        ("drift_rad_s", (-20.0, 20.0)),
+        ("bias_V", (-1.0, 1.0)),
+    ],
+)
+def test_slider_of_a_key_without_a_row_follows_its_bounds_and_its_value(
+    name: str, expected: tuple[float, float]
+) -> None:
+    assert slider_range(_WithoutRows, name, getattr(_WithoutRows(), name)) == pytest.approx(expected)
+
+
+def test_upper_bound_of_a_key_is_the_highest_that_it_may_have() -> None:
+    assert within_reason(_WithoutRows, "share") == (0.0, 1.0)
+    assert within_reason(_WithoutRows, "time_constant_s") == (1e-6, 1e6)
+    assert within_reason(_WithoutRows, "turn_rad") == (-1e4, 1e4)

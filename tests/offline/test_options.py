@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
 
 from dcmp_hil import load_rig
+from dcmp_hil.common.section import Positive
 from dcmp_hil.config.rig import KINDS
+from dcmp_hil.control.observers.paper import PaperSettings
+from dcmp_hil.control.observers.settings import ObserverSettings
+from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.offline import ReplaySettings, read_recording, replay
+from dcmp_hil.offline import ColumnOptions, ReplaySettings, read_recording, replay
 from tests.helpers import named
 from tests.offline.synthetic import swing, write
 
@@ -90,6 +94,34 @@ def test_every_observer_of_a_rig_runs_over_a_file(kind: str, cli: Cli, recording
     assert of_name.figures.velocity_error_rms_rad_s == by_name["velocity_error_rms_rad_s"]
 
 
+class OwnDefaultsSettings(ObserverSettings):
+    """A further kind of observer, with keys of the usual names and defaults of its own."""
+
+    kind: Literal["own_defaults"]
+    L1_1_s: Positive = 12.0
+    L2_1_s2: Positive = 34.0
+    M_rad_s3: Positive = 56.0
+    mu0_rad_s: Positive = 7.0
+    start: Literal["zero", "measured"] = "zero"
+
+    def build(self, context: ObserverContext) -> SuperTwisting:
+        return SuperTwisting(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
+
+
+def test_a_further_observer_keeps_its_own_defaults(monkeypatch: pytest.MonkeyPatch, recording: str) -> None:
+    kinds = {**KINDS["observer"], "own_defaults": OwnDefaultsSettings}
+    monkeypatch.setitem(KINDS, "observer", kinds)
+    usual = OwnDefaultsSettings(kind="own_defaults")
+    assert ReplaySettings(observer="own_defaults").section == usual
+    given = ReplaySettings(observer="own_defaults", L2=5.51, mu0=8.0).section
+    assert given == usual.model_copy(update={"L2_1_s2": 5.51, "mu0_rad_s": 8.0})
+    data = read_recording(Path(recording))
+    by_name = replay(data, ReplaySettings(observer="own_defaults"))
+    by_gains = replay(data, ReplaySettings(L1=12.0, L2=34.0, M=56.0, mu0=7.0))
+    assert by_name.figures == by_gains.figures
+    assert ReplaySettings(observer="paper", from_zero=True).section == PaperSettings(start="zero")
+
+
 @pytest.mark.parametrize("key", ["observer.mu0_rad_s=2000", "observer.L1_1_s=9000"])
 def test_rules_of_a_loop_do_not_apply_where_none_is_closed(key: str, cli: Cli, recording: str) -> None:
     with pytest.raises(ConfigError):
@@ -138,3 +170,19 @@ def test_what_cannot_be_is_refused(options: tuple[str, ...], says: str, cli: Cli
     outcome = cli("replay", recording, *options, "--no-write")
     assert (outcome.code, outcome.out) == (2, "")
     assert says in outcome.err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--period", "10.000001"), ("--from", "-0.00000012345678"), ("--L1", "10000.00001")]
+)
+def test_a_number_that_is_refused_is_named_as_it_was_given(
+    cli: Cli, recording: str, option: str, value: str
+) -> None:
+    outcome = cli("replay", recording, f"{option}={value}", "--no-write")
+    assert outcome.code == 2
+    assert float(outcome.err.partition("got ")[2].partition(";")[0]) == float(value)
+
+
+def test_a_period_that_was_given_is_told_in_full(recording: str) -> None:
+    read = read_recording(Path(recording), ColumnOptions(period=0.00500000123, time="none"))
+    assert any("0.00500000123 s" in note for note in read.notes), read.notes

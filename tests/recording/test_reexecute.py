@@ -96,7 +96,7 @@ def test_changes_made_in_a_run_are_made_again(tmp_path: Path, script: dict[int, 
     changed.run()
     assert {answer.what for answer in changed.answers if answer} == {APPLIED}
     recorded = read_run(tmp_path)
-    assert len(changes_in(recorded.events, recorded.rig)) == len(script)
+    assert len(changes_in(recorded.events, recorded.rig).made) == len(script)
     assert compare(recorded, reexecute(recorded)).identical
     told = friction == "true" or any(
         not key.startswith("reference") for keys in script.values() for key in keys
@@ -290,6 +290,6 @@ def test_a_change_is_repeated_without_the_file_of_the_reference(tmp_path: Path) 
     rig = bench("reference.kind=csv", f"reference.file={file}")
     rig = rig.model_copy(update={"reference": rig.reference.model_copy(update={"file": "/never/there.csv"})})
     event = Event(0.5, "INFO", EventKind.CHANGE, "", ChangeData({"controller.kp_1_s2": 5000.0}))
-    ((t, change),) = changes_in([event], rig)
+    ((t, change),) = changes_in([event], rig).made
     assert (t, change.variation) == (0.5, None)
     assert change.gains is not None

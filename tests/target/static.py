@@ -7,6 +7,7 @@ import functools
 import itertools
 import json
 import re
+import shutil
 import subprocess
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -86,7 +87,7 @@ class Deviation(NamedTuple):
     rule: str
     where: str  # a pattern
     why: str
-    version: str = "2.10"  # the one of cppcheck that needs it
+    version: str = "2.10"  # one of cppcheck that needs it
 
 
 # ------------------------------------------------------------------------------------ cppcheck
@@ -105,8 +106,22 @@ def _addon(folder: Path) -> Path:
     return call
 
 
+def version_of(said: str) -> tuple[int, int]:
+    """Return what `cppcheck --version` says, without what only mends: 2.13.0 is (2, 13)."""
+    found = re.match(r"Cppcheck (\d+)\.(\d+)", said)
+    assert found, said
+    return int(found[1]), int(found[2])
+
+
 def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Finding]:
-    """Return what cppcheck and the MISRA addon say of some files, compiled like a program's."""
+    """Return what cppcheck and the MISRA addon say of some files, compiled like a program's.
+
+    Cppcheck writes its dumps for the addon beside the sources, the older ones under a name without the number
+    of the process: the sources are a copy in `folder`, so that two runs at once do not read each other's.
+    """
+    tree = folder / "firmware"
+    if not tree.exists():
+        shutil.copytree(FIRMWARE, tree, ignore=shutil.ignore_patterns("build", "*.dump", "*.ctu-info"))
     command = [
         needed("cppcheck"),
         f"--addon={_addon(folder)}",
@@ -120,7 +135,7 @@ def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Find
         *program.options,
         *(str(file.relative_to(FIRMWARE) if file.is_relative_to(FIRMWARE) else file) for file in files),
     ]
-    done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     found = set()
     for line in done.stderr.splitlines():
@@ -197,7 +212,7 @@ def deviations(page: str) -> list[Deviation]:
 
 
 def judge(found: Iterable[Finding], rows: list[Deviation], version: str = "2.10") -> Iterator[str]:
-    """Yield every finding without a deviation, and every deviation without a finding."""
+    """Yield every finding without a deviation, and every deviation of this version without a finding."""
     idle = {row for row in rows if row.version == version}
     for finding in sorted(found):
         account = [

@@ -12,7 +12,7 @@ import pytest
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tests.target.build import build, needed
 from tools import artefact
-from tools.boards import read_boards, released
+from tools.boards import FOLDER, read_boards, released
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,5 +61,9 @@ def test_sizes_are_printed_and_small(tmp_path: Path, figure: Callable[[str], Non
         vectors = (tmp_path / f"released/{board}.vectors.bin").read_bytes()
         code = (tmp_path / f"released/{board}.code.bin").read_bytes()
         assert image == vectors.ljust(0xC000, b"\xff") + code
-        assert hashlib.sha256(image).hexdigest() in json.dumps(manifest)
+        known = manifest["boards"][board]  # type: ignore[index]
+        assert known["sha256"][f"{board}.bin"] == hashlib.sha256(image).hexdigest()
+        assert (
+            known["board_h_sha256"] == hashlib.sha256((FOLDER / board / "board.h").read_bytes()).hexdigest()
+        )
         assert PROTOCOL_HASH.to_bytes(4, "little") in code

@@ -28,11 +28,11 @@ def test_board_that_is_there_is_on_the_pages_and_released(
     text = (FOLDER / "bench_f405_dac/board.h").read_text("utf-8")
     (tmp_path / "other").mkdir()
     (tmp_path / "other/board.h").write_text(
-        text.replace("NUMBER 3", "NUMBER 99").replace("PB15", "PC4"), "utf-8"
+        text.replace("NUMBER 3", "NUMBER 199").replace("PB15", "PC4"), "utf-8"
     )
     assert released(read_boards(tmp_path)) == ["other"]
     made = files(tmp_path)
-    assert "| 99 | other |" in made[PROTOCOL]
+    assert "| 199 | other |" in made[PROTOCOL]
     assert re.search(r"ENABLE, .* \| PC4 \|$", made[README], re.MULTILINE)
     monkeypatch.setattr(boards, "files", lambda: made)
     monkeypatch.setattr("sys.argv", ["boards", "--check"])
@@ -45,6 +45,16 @@ def test_every_pin_that_a_board_may_have_is_a_row() -> None:
     text = (FIRMWARE / "cmake/boards.cmake").read_text("utf-8")
     keys = re.findall(r"^set\((?:BENCH|DAC|PWM)_PINS ([A-Z_ ]+)\)", text, re.MULTILINE)
     assert sorted(" ".join(keys).split()) == sorted(boards.PIN_MEANINGS)
+
+
+def test_what_is_in_a_comment_is_not_data(tmp_path: Path) -> None:
+    text = (FOLDER / "bench_f405_dac/board.h").read_text("utf-8")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/board.h").write_text(
+        text.replace("#define BOARD_DAC PA4\n", "/* as on the other board:\n#define BOARD_PWM PA8\n*/\n"),
+        "utf-8",
+    )
+    assert read_boards(tmp_path)["other"].amplifier is None
 
 
 @pytest.mark.parametrize("line", ["#define BOARD_NUMBER 3\n", "#define BOARD_CRYSTAL_HZ 8000000u\n"])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.tools import fake_programmer
+from tests.tools.board_images import DAC, write_images
 from tools import flash
 from tools.brown_out import OPTCR_ADDRESS, OptionError, check_written, level, planned, write_by_probe, writes
 
@@ -132,10 +133,9 @@ def test_command_holds_every_write_in_order() -> None:
 
 
 def run(folder: Path, monkeypatch: pytest.MonkeyPatch, by: str, *options: str) -> int:
-    for piece in ("code", "vectors"):
-        (folder / f"bench_f405_dac.{piece}.bin").write_bytes(b"x")
+    write_images(folder)
     monkeypatch.setenv("PATH", f"{folder}:/bin:/usr/bin")
-    words = ["bench_f405_dac", "bench-serial", "--firmware", str(folder), "--by", by, *options]
+    words = [DAC, "bench-serial", "--firmware", str(folder), "--by", by, *options]
     monkeypatch.setattr("sys.argv", ["flash", *words])
     return flash.main()
 

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
+from tests.tools.board_images import DAC, write_images
 from tools import flash
-from tools.boards import read_boards, released
-from tools.flash import CODE_ADDRESS, VECTORS_ADDRESS, Piece, commands, record_of
+from tools.boards import FOLDER, read_boards, released
+from tools.flash import CODE_ADDRESS, VECTORS_ADDRESS, Piece, commands
 from tools.record import RECORD_ADDRESS, SECTOR_BYTES, RecordLink, image, record
+from tools.rig_record import record_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-DAC = "bench_f405_dac"
+PWM = "bench_f405_pwm"
+BOARDS = read_boards()
 LINK_AT, BAUD_AT, ZERO_AT, FULL_AT = 44, 48, 52, 56
 
 
@@ -26,8 +30,7 @@ def word(data: bytes, at: int) -> int:
 
 @pytest.fixture
 def built(tmp_path: Path) -> Path:
-    for piece in ("code", "vectors"):
-        (tmp_path / f"{DAC}.{piece}.bin").write_bytes(piece.encode())
+    write_images(tmp_path)
     return tmp_path
 
 
@@ -45,27 +48,24 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     ],
 )
 def test_record_is_that_of_the_rig(rig: str, sets: list[str], link: RecordLink, baud: int) -> None:
-    made = record_of(load_rig(rig, sets), DAC, zero_code=2050, full_scale_V=12.0)
+    made = record_of(load_rig(rig, sets), BOARDS[DAC], zero_code=2050, full_scale_V=12.0)
     assert (word(made, LINK_AT), word(made, BAUD_AT)) == (link, baud)
     assert (word(made, ZERO_AT), word(made, FULL_AT)) == (2050, 12_000)
 
 
 def test_record_refuses_what_the_board_cannot_put_out() -> None:
     with pytest.raises(ConfigError, match=r"got 10; expected 5 V or less.*--full-scale-V"):
-        record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=5.0)
+        record_of(load_rig("bench-serial"), BOARDS[DAC], zero_code=2048, full_scale_V=5.0)
 
 
 def test_record_refuses_a_rig_without_a_device() -> None:
     with pytest.raises(ConfigError, match="a board is at serial or can"):
-        record_of(load_rig("bench-1khz"), DAC, zero_code=2048, full_scale_V=10.0)
-
-
-PWM = "bench_f405_pwm"
+        record_of(load_rig("bench-1khz"), BOARDS[DAC], zero_code=2048, full_scale_V=10.0)
 
 
 def test_pwm_board_is_given_the_supply_that_was_said_and_that_the_rig_has() -> None:
     rig = load_rig("bench-serial", ["amplifier.supply_V=24"])
-    assert word(record_of(rig, PWM, supply_V=24.0), FULL_AT) == 24_000
+    assert word(record_of(rig, BOARDS[PWM], supply_V=24.0), FULL_AT) == 24_000
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_supply_that_is_not_known_or_not_the_rigs_is_refused(
     board: str, rig: list[str], said: dict[str, float], words: str
 ) -> None:
     with pytest.raises(ConfigError, match=words):
-        record_of(load_rig("bench-serial", rig), board, **said)  # type: ignore[arg-type]
+        record_of(load_rig("bench-serial", rig), BOARDS[board], **said)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("board", released(read_boards()))
@@ -115,7 +115,7 @@ def test_pwm_board_without_its_supply_is_one_line(
 
 
 def test_record_fills_its_two_sectors_and_no_more() -> None:
-    made = image(record_of(load_rig("bench-serial"), DAC, zero_code=2048, full_scale_V=10.0))
+    made = image(record_of(load_rig("bench-serial"), BOARDS[DAC], zero_code=2048, full_scale_V=10.0))
     assert RECORD_ADDRESS + len(made) == CODE_ADDRESS
     assert len(made) == 2 * SECTOR_BYTES
     assert set(made[SECTOR_BYTES:]) == {0xFF}  # older records are gone with it
@@ -144,6 +144,97 @@ def test_dry_run_shows_what_would_be_done(
     assert [line.split(" -S ")[-1].split()[0] for line in said.splitlines()[:4]] == [
         "0x1fffc000:4", "0x8004000", "0x800c000", "0x8000000",
     ]  # fmt: skip
+
+
+# ----------------------------------------------------------------- the image is that of today's board.h
+
+
+def write_board(folder: Path, name: str = "mine") -> Path:
+    """Write a board of one's own; return its board.h."""
+    text = (FOLDER / DAC / "board.h").read_text("utf-8")
+    (folder / name).mkdir(parents=True)
+    (folder / name / "board.h").write_text(text.replace("BOARD_NUMBER 3", "BOARD_NUMBER 199"), "utf-8")
+    return folder / name / "board.h"
+
+
+def test_board_of_another_folder_is_flashed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_images(tmp_path, "mine", write_board(tmp_path / "boards"))
+    folders = ("--boards", str(tmp_path / "boards"), "--firmware", str(tmp_path))
+    assert run(monkeypatch, *folders, "mine", "bench-serial", "--dry-run") == 0
+    assert f"-w {tmp_path}/mine.code.bin" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="2"):
+        run(monkeypatch, "mine", "bench-serial", "--dry-run")
+    assert "invalid choice: 'mine'" in capsys.readouterr().err
+
+
+def test_image_of_another_board_h_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    boards = tmp_path / "my boards"
+    data = write_board(boards)
+    write_images(tmp_path, "mine", data)
+    data.write_text(data.read_text("utf-8").replace("ENABLE PB15", "ENABLE PC4"), "utf-8")
+    folders = ("--boards", str(boards), "--firmware", str(tmp_path))
+    assert run(monkeypatch, *folders, "mine", "bench-serial", "--dry-run") == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"error: {data}: mine.code.bin was built of another board.h")
+    assert said.err.endswith(f"anew: `python -m tools.artefact {tmp_path} --boards '{boards}'`.\n")
+    assert run(monkeypatch, *folders, "mine", "bench-serial", "--only", "record", "--dry-run") == 0
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "said"),
+    [
+        (f"{DAC}.vectors.bin", "other", f"{DAC}.vectors.bin: it is not the one that manifest.json says."),
+        (f"{DAC}.code.bin", "other", f"{DAC}.code.bin: it is not the one that manifest.json says."),
+        ("manifest.json", None, f"manifest.json: it does not say of what {DAC} was built."),
+        ("manifest.json", "{", f"manifest.json: it does not say of what {DAC} was built."),
+        ("manifest.json", "[]", f"manifest.json: it does not say of what {DAC} was built."),
+        ("manifest.json", '{"boards": {}}', f"manifest.json: it does not say of what {DAC} was built."),
+        (
+            "manifest.json",
+            json.dumps({"boards": {DAC: {"sha256": {}}}}),  # as older ones are
+            f"{DAC}.code.bin was built of another board.h",
+        ),
+    ],
+)
+def test_image_that_the_manifest_does_not_know_is_refused(
+    built: Path,
+    file: str,
+    text: str | None,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (built / file).unlink()
+    if text is not None:
+        (built / file).write_text(text)
+    assert run(monkeypatch, DAC, "bench-serial", "--firmware", str(built), "--dry-run") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert line.endswith(f"Build it anew: `python -m tools.artefact {built}`.")
+
+
+@pytest.mark.parametrize(("text", "said"), [(None, "no board is in"), ("", "mine/board.h: 'NUMBER'. Build")])
+def test_folder_without_a_board_is_one_line(
+    tmp_path: Path,
+    text: str | None,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if text is not None:
+        write_board(tmp_path).write_text(text)
+    assert run(monkeypatch, "mine", "bench-serial", "--boards", str(tmp_path), "--dry-run") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: --boards: ")
+    assert said in line
+
+
+# -------------------------------------------------------------------------------------------- mistakes
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from tools.protocol.page import page
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from cantools.database.can import Database, Message, Signal
+    from cantools.database.can import Message, Signal
 
 DBC = """VERSION "1"
 NS_ :
@@ -54,6 +54,11 @@ BO_ 80 LAST: 6 DEVICE
  SG_ two : 32|1@1+ (1,0) [0|1] "" HOST
  SG_ three : 33|1@1+ (1,0) [0|1] "" HOST
  SG_ crc8 : 40|8@1+ (1,0) [0|255] "" HOST
+CM_ BO_ 16 "Wide fields.";
+CM_ BO_ 48 "Fields across bytes.";
+CM_ BO_ 64 "Few fields.";
+CM_ BO_ 80 "The last.";
+CM_ SG_ 16 id "A kind.";
 BA_DEF_ BO_ "PythonClass" STRING ;
 BA_DEF_ BO_ "CStruct" STRING ;
 BA_DEF_ SG_ "PythonEnum" STRING ;
@@ -160,7 +165,8 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> tuple[FFI, Any]:
 
 
 def _declarations(folder: Path) -> str:
-    text = (folder / "dcmp_frame.h").read_text() + (folder / "dcmp_protocol.h").read_text()
+    headers = ("dcmp_frame.h", "dcmp_protocol.h", "dcmp_message.h")
+    text = "".join((folder / name).read_text() for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).replace("DCMP_PAYLOAD_MAX", "8")
     text = text.replace("\\\n", "")
     return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
@@ -179,6 +185,17 @@ def test_c_packs_and_unpacks_as_cantools_does(core: tuple[FFI, Any], name: str) 
         back: Any = ffi.new(f"struct dcmp_{name.lower()} *")
         unpack(frame, back)
         assert {field: int(getattr(back, field)) for field in fields} == fields
+
+
+@pytest.mark.parametrize("number", [0, 2, 6], ids=["before the first", "a gap", "behind the last"])
+def test_c_takes_no_number_without_a_message(core: tuple[FFI, Any], number: int) -> None:
+    """Also not a frame without payload, which has the length of such a number's row in the table."""
+    ffi, lib = core
+    assert number not in {_message(name).frame_id >> 4 for name in NAMES}
+    for length in range(9):
+        frame: Any = ffi.new("struct dcmp_frame *", (16 * number + 3, length, [0] * 8))
+        assert lib.dcmp_check_any(frame, 3) == lib.DCMP_FOREIGN
+        assert lib.dcmp_check(frame, 3) == lib.DCMP_FOREIGN
 
 
 def test_c_has_the_values(core: tuple[FFI, Any]) -> None:
@@ -205,27 +222,3 @@ def test_a_field_is_typed_in_the_dbc_alone() -> None:
     assert "    put(&frame->data[6], (uint8_t)message->temperature_C, 1);\n" in c_code.pack(found)
     assert "    message->temperature_C = (int8_t)frame->data[6];\n" in c_code.unpack(found)
     assert "`temperature_C` 48, s8 degC" in page(PAGE.read_text("utf-8"), load(text), found, 0)
-
-
-# --------------------------------------------------------------------------- layouts that are none
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("SG_ high : 16|16@1-", "SG_ high : 23|16@0-", r"^WIDE\.high is not little-endian$"),
-        ("16|16@1- (1,0)", "16|16@1- (0.1,0)", r"^WIDE\.high has a scale or an offset; "),
-        ("16|16@1- (1,0)", "16|16@1- (1,5)", r"^WIDE\.high has a scale or an offset; "),
-        ("[-32768|32767]", "[0|0]", r"^WIDE\.high has no bounds$"),
-        ("0|12@1+", "0|12@1-", r"^WIDE: low, lone: a signed field shares no byte$"),
-        ("16|24@1+", "16|24@1-", r"^SPARSE: counts: a signed field has 8, 16 or 32 bits$"),
-        ("22|10@1+", "22|2@1+", r"^ACROSS: first, flag, second: fields share 1, 2 or 4 bytes, not 3$"),
-        ("SG_ crc8 : 40|8", "SG_ crc : 40|8", r"^LAST: its last byte is not its crc8$"),
-        ('2 "SQUARE"', '2 "WIDE"', r"^two constants of C have one name: DCMP_WIDE$"),
-    ],
-)
-def test_what_is_not_known_is_refused(old: str, new: str, said: str) -> None:
-    assert DBC.count(old) == 1
-    database: Database = load(DBC.replace(old, new))
-    with pytest.raises(ValueError, match=said):
-        c_code.header(layouts(database))

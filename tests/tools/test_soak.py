@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tools.soak.memory import Growth, Memory
-from tools.soak.result import Soaked
+from tools.soak.result import SoakResult
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,10 +27,10 @@ def half_an_hour(leak: float, seed: int) -> Growth:
     return growth
 
 
-def soaked(growth: Growth) -> Soaked:
+def soaked(growth: Growth) -> SoakResult:
     memory = Memory()
     memory.growth["telemetry process"] = growth
-    return Soaked(30.0, 60.0, {}, memory, 0, 1_800_000, 1_800_000, 200.0, 400.0, [])
+    return SoakResult(30.0, 60.0, {}, memory, 0, 1_800_000, 1_800_000, 200.0, 400.0, [])
 
 
 @pytest.mark.parametrize("seed", range(50))

@@ -34,6 +34,8 @@ _SAYS: Mapping[str, tuple[str, ...]] = {
         *(r"wrote \S+", r"warning: .*", r"note: .*"),
         *(r'(?:[^:"]+: )?(?:time|position|velocity|torque|voltage): column ".*" in .* \(.*\)', r"mu0 = .*\."),
         *(r"Evenly sampled, .*\.", r"The rows are not evenly sampled: .*\.", r"The stamps are .*\."),
+        r".+: The disturbance is judged by a reference with the model of this variant, .*",
+        r".+: \d+ changes? of .+ in the run (?:is|are) not repeated here, because .*",
     ),
     "export": (r"wrote \S+",),
     "rigs": (r"wrote \S+", r".*copy.*"),

@@ -9,6 +9,7 @@ from tools.protocol import c_code, python_code
 from tools.protocol.dbc import DBC, ROOT, load, protocol_hash
 from tools.protocol.layout import layouts
 from tools.protocol.page import page
+from tools.protocol.statements import DbcError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,7 +37,10 @@ def files() -> dict[Path, str]:
 
 def main() -> None:
     """Write the files, or with --check say which are not as they should be."""
-    made = files()
+    try:
+        made = files()
+    except DbcError as error:
+        sys.exit(f"{DBC.name}: {error}")
     stale = {path: text for path, text in made.items() if not _is(path, text)}
     if "--check" in sys.argv[1:]:
         for path in stale:

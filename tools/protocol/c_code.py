@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING
 
-from tools.protocol.layout import MARK, Enumeration, Field, Layout, Word, enumerations_of
+from tools.protocol.layout import MARK, Field, Layout, Word, enumerations_of
+from tools.protocol.rules import check_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tools.protocol.enumerations import Enumeration
+
 _LINE_LENGTH_MAX = 120
 _RENAMED = {"FAULT": "FAULTED", "NONE": "NO_FAULT"}
 """Values whose own name is that of a message, or says too little without its enumeration."""
+_MACROS = ("DCMP_PROTOCOL_H", "DCMP_PROTOCOL_HASH", "DCMP_LAYOUTS", "DCMP_FROM_HOST")
 _INCLUDES = '#include <stdbool.h>\n#include <stdint.h>\n\n#include "dcmp_frame.h"\n'
 _BIT_PACK = """
 static uint32_t bit(bool value, unsigned int position)
@@ -62,17 +65,14 @@ def header(found: list[Layout]) -> str:
 
     Raises
     ------
-    ValueError
+    DbcError
         If two constants have one name.
     """
     named = [one for one in enumerations_of(found) if one.c]
     names = [name for one in named for name in map(_constant, one.values)]
-    twice = {
-        name for name, count in Counter([*names, *(f"DCMP_{one.name}" for one in found)]).items() if count > 1
-    }
-    if twice:
-        raise ValueError(f"two constants of C have one name: {', '.join(sorted(twice))}")
-    parts = [_INCLUDES, _identifiers(found), *map(_enum, named), _layouts(found), *map(_struct, found)]
+    check_once("constants of C", [*_MACROS, *names, *(f"DCMP_{one.name}" for one in found)])
+    tables = [_layouts(found), _from_host(found)]
+    parts = [_INCLUDES, _identifiers(found), *map(_enum, named), *tables, *map(_struct, found)]
     parts.append("/* Packing seals; unpacking takes a frame that was found genuine. */")
     parts[-1] += "".join(f"\n{_pack_head(one)};" for one in found) + "\n"
     parts.append("\n".join(f"{_unpack_head(one)};" for one in found) + "\n")
@@ -132,6 +132,13 @@ def _layouts(found: list[Layout]) -> str:
         rows.append(f"    {row + ',':12} /* {one.name if one else 'no message'} */ \\\n")
     head = "/* By message number, which is identifier / 16: length, and whether the host sends it. */"
     return f"{head}\n#define DCMP_LAYOUTS {{ \\\n{''.join(rows)}}}\n"
+
+
+def _from_host(found: list[Layout]) -> str:
+    """Return the list of the messages that a device must receive, for an acceptance filter of CAN."""
+    rows = ", \\\n".join(f"    DCMP_{one.name}" for one in found if one.from_host)
+    head = "/* Identifiers, of node 0, of the messages that the host sends. */"
+    return f"{head}\n#define DCMP_FROM_HOST {{ \\\n{rows} \\\n}}\n"
 
 
 def _struct(layout: Layout) -> str:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from tools.protocol import rules
+from tools.protocol.dbc import attribute
+from tools.protocol.enumerations import Enumeration, enumerations
+from tools.protocol.statements import DbcError
 
 if TYPE_CHECKING:
     from cantools.database.can import Database, Message, Signal
@@ -12,26 +17,8 @@ MARK = "Generated from firmware/proto/dcmp.dbc; `make generate` writes it."
 _WHOLE_WORDS = {(1, False), (2, False), (3, False), (4, False), (1, True), (2, True), (4, True)}
 _SHARED_BYTES = {1, 2, 4}
 _SPLIT_BYTES = 3
-
-
-@dataclass(frozen=True)
-class Enumeration:
-    """Named values of a field.
-
-    Attributes
-    ----------
-    python, c : str
-        Its name in Python (with a module in front: it is not generated) and in C; empty if it has none there.
-    comment : str
-        The field's comment.
-    values : dict of str to int
-        In the order of their numbers.
-    """
-
-    python: str
-    c: str
-    comment: str
-    values: dict[str, int]
+_PYTHON_CLASSES = ("Any", "Callable", "IntEnum", "Message", "MessageLayout", "NamedTuple", "Struct")
+"""Classes that the generated modules have already."""
 
 
 @dataclass(frozen=True)
@@ -106,11 +93,15 @@ def layouts(database: Database) -> list[Layout]:
 
     Raises
     ------
-    ValueError
-        If a message has a layout that the generators do not know: which one, and why.
+    DbcError
+        If the generators would get a message wrong: which one, why, and what to write instead.
     """
-    enumerations = _enumerations(database)
-    return [_layout(message, enumerations) for message in database.messages]
+    rules.check(database)
+    of = enumerations(database)
+    found = [_layout(message, of) for message in database.messages]
+    rules.check_once("classes of Python", [*_PYTHON_CLASSES, *_python_names(found)])
+    rules.check_once("structures or enumerations of C", _c_names(found))
+    return found
 
 
 def enumerations_of(found: list[Layout]) -> list[Enumeration]:
@@ -119,53 +110,54 @@ def enumerations_of(found: list[Layout]) -> list[Enumeration]:
     return [one for at, one in enumerate(every) if one not in every[:at]]
 
 
-def _layout(message: Message, enumerations: list[Enumeration]) -> Layout:
-    *signals, crc = sorted(message.signals, key=lambda signal: signal.start)
-    if (crc.name, crc.start, crc.length) != ("crc8", 8 * message.length - 8, 8):
-        raise ValueError(f"{message.name}: its last byte is not its crc8")
-    by_name = {signal.name: _field(message, signal, enumerations) for signal in signals}
+def _python_names(found: list[Layout]) -> list[str]:
+    made = [one.python for one in enumerations_of(found) if one.python and "." not in one.python]
+    return [*made, *(layout.python for layout in found)]
+
+
+def _c_names(found: list[Layout]) -> list[str]:
+    return [*(one.c for one in enumerations_of(found) if one.c), *(layout.c for layout in found)]
+
+
+def _layout(message: Message, of: dict[str, Enumeration]) -> Layout:
+    *signals, _ = sorted(message.signals, key=lambda signal: signal.start)
+    by_name = {signal.name: _field(signal, of.get(f"{message.name}.{signal.name}")) for signal in signals}
     return Layout(
         name=message.name,
         identifier=message.frame_id,
         length=message.length,
         from_host=message.senders == ["HOST"],
         comment=message.comment or "",
-        python=_attribute(message, "PythonClass") or message.name.title().replace("_", ""),
-        c=_attribute(message, "CStruct") or f"dcmp_{message.name.lower()}",
-        fields=tuple(by_name[name] for name in _order(signals)),
+        python=attribute(message, "PythonClass") or message.name.title().replace("_", ""),
+        c=attribute(message, "CStruct") or f"dcmp_{message.name.lower()}",
+        fields=tuple(by_name[name] for name in _order(message.name, signals)),
         words=tuple(_words(message.name, list(by_name.values()))),
     )
 
 
-def _order(signals: list[Signal]) -> list[str]:
+def _order(message: str, signals: list[Signal]) -> list[str]:
     """Return the names in the order of the structures: that of the payload but for `PlacedBefore`."""
     names = [signal.name for signal in signals]
     for signal in signals:
-        if before := _attribute(signal, "PlacedBefore"):
+        if before := attribute(signal, "PlacedBefore"):
+            if before == signal.name or before not in names:
+                raise DbcError(f"{message}.{signal.name}: PlacedBefore is another field of it, not {before}")
             names.remove(signal.name)
             names.insert(names.index(before), signal.name)
     return names
 
 
-def _field(message: Message, signal: Signal, enumerations: list[Enumeration]) -> Field:
-    where = f"{message.name}.{signal.name}"
-    if signal.byte_order != "little_endian":
-        raise ValueError(f"{where} is not little-endian")
-    if (signal.scale, signal.offset) != (1, 0):
-        raise ValueError(f"{where} has a scale or an offset; the wire has integers, with their unit")
-    if signal.minimum is None or signal.maximum is None:
-        raise ValueError(f"{where} has no bounds")
-    values = _values(signal)
+def _field(signal: Signal, enumeration: Enumeration | None) -> Field:
     return Field(
         name=signal.name,
         bit=signal.start,
         bits=signal.length,
         signed=signal.is_signed,
-        least=int(signal.minimum),
-        most=int(signal.maximum),
+        least=int(signal.minimum or 0),
+        most=int(signal.maximum or 0),
         unit=signal.unit or "",
         comment=signal.comment or "",
-        enumeration=next((one for one in enumerations if values and one.values == values), None),
+        enumeration=enumeration,
     )
 
 
@@ -179,8 +171,12 @@ def _words(name: str, fields: list[Field]) -> list[Word]:
             words[-1] = Word(start, max(last + 1 - start, words[-1].bytes), (*words[-1].fields, field))
         else:
             words.append(Word(first, last + 1 - first, (field,)))
+    names = {field.name for field in fields}
     for word in words:
         _check(name, word)
+        halves = {f"{word.fields[0].name}_{half}" for half in ("low", "high")} if word.split else set()
+        if taken := halves & names:
+            raise DbcError(f"{name}: {', '.join(taken)} is a half of {word.fields[0].name}; rename it")
     return words
 
 
@@ -188,27 +184,12 @@ def _check(name: str, word: Word) -> None:
     where = f"{name}: {', '.join(field.name for field in word.fields)}"
     if not word.shared:
         if (word.bytes, word.fields[0].signed) not in _WHOLE_WORDS:
-            raise ValueError(f"{where}: a signed field has 8, 16 or 32 bits")
+            raise DbcError(f"{where}: a field of whole bytes has 8, 16 or 32 bits, or 24 unsigned ones")
     elif word.bytes not in _SHARED_BYTES:
-        raise ValueError(f"{where}: fields share 1, 2 or 4 bytes, not {word.bytes}")
+        raise DbcError(
+            f"{where}: fields share 1, 2 or 4 bytes, not {word.bytes}; begin one at a byte's lowest bit"
+        )
     elif any(field.signed for field in word.fields):
-        raise ValueError(f"{where}: a signed field shares no byte")
-
-
-def _enumerations(database: Database) -> list[Enumeration]:
-    return [
-        Enumeration(python, c, signal.comment or "", _values(signal))
-        for message in database.messages
-        for signal in message.signals
-        if (python := _attribute(signal, "PythonEnum")) + (c := _attribute(signal, "CEnum"))
-    ]
-
-
-def _values(signal: Signal) -> dict[str, int]:
-    return {str(name): int(value) for value, name in sorted((signal.choices or {}).items())}
-
-
-def _attribute(of: Message | Signal, name: str) -> str:
-    """Return an attribute of the DBC; empty if it is not set."""
-    attributes: dict[str, Any] = of.dbc.attributes if of.dbc else {}
-    return str(attributes[name].value) if name in attributes else ""
+        raise DbcError(
+            f"{where}: a signed field shares no byte; give it 8, 16 or 32 bits from a byte's lowest on"
+        )

@@ -7,12 +7,16 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from tools.protocol.layout import MARK, Enumeration, Field, Layout, Word, enumerations_of
+from tools.protocol.dbc import ROOT
+from tools.protocol.layout import MARK, Field, Layout, Word, enumerations_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from tools.protocol.enumerations import Enumeration
+
 _LINE_LENGTH_MAX = 110
+_FILE = "dcmp_hil/wire/messages.py"  # whose rules the formatter takes
 _CODES = {1: "B", 2: "H", 4: "I"}
 _MESSAGES = f'''# {MARK}
 """Messages of the DBC, field by field."""
@@ -86,8 +90,10 @@ def layouts(found: list[Layout]) -> str:
 
 
 def _formatted(text: str) -> str:
-    command = [sys.executable, "-m", "ruff", "format", "--stdin-filename", "dcmp_hil/wire/generated.py", "-"]
-    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)  # noqa: S603
+    """Return text in the project's own format, wherever this is called from."""
+    named = ["--config", str(ROOT / "pyproject.toml"), "--stdin-filename", str(ROOT / _FILE)]
+    command = [sys.executable, "-m", "ruff", "format", *named, "-"]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True, cwd=ROOT)  # noqa: S603
     return done.stdout
 
 

@@ -32,7 +32,7 @@ from dcmp_hil.telemetry.sink_factories import sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
 from tools.soak.memory import Memory, cpu_s, has_ended
-from tools.soak.result import Soaked, periods_in, size_mb
+from tools.soak.result import SoakResult, periods_in, size_mb
 from tools.soak.source import Leak, Source, a_minute, events
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ _QUIET_TIMEOUT_S = 30.0
 _POLL_PERIOD_S = 0.05
 
 
-def soak(minutes: float, speed: float, folder: Path, history: str, leak: float = 0.0) -> Soaked:
+def soak(minutes: float, speed: float, folder: Path, history: str, leak: float = 0.0) -> SoakResult:
     """Run data through telemetry; return the result.
 
     Parameters
@@ -102,7 +102,7 @@ def soak(minutes: float, speed: float, folder: Path, history: str, leak: float =
     commands.close("The soak is over.", AT_ZERO)
     _wait_for_end(pids["telemetry process"])
     troubles += apart.figures.troubles
-    return Soaked(
+    return SoakResult(
         minutes, wall, cpu, memory, apart.dropped, periods_in(folder / "run.mcap"), source.written,
         size_mb(folder / "run.mcap"), size_mb(folder / "run.rrd"), troubles,
     )  # fmt: skip

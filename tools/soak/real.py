@@ -12,14 +12,14 @@ from pathlib import Path
 from dcmp_hil.live import command_server
 from dcmp_hil.telemetry import telemetry_worker
 from tools.soak.memory import Memory, cpu_s
-from tools.soak.result import Soaked, periods_in, size_mb
+from tools.soak.result import SoakResult, periods_in, size_mb
 
 _POLL_PERIOD_S = 5.0
 _PROGRAMS = {telemetry_worker.__name__: "telemetry process", command_server.__name__: "command process"}
 """Module that a child of a run imports, to what it is called."""
 
 
-def real(minutes: float, folder: Path) -> Soaked:
+def real(minutes: float, folder: Path) -> SoakResult:
     """Run `dcmp-hil run` for so many minutes, and measure its processes."""
     command = [sys.executable, "-m", "dcmp_hil", "run", "bench-1khz", "--duration", str(60.0 * minutes)]
     command += ["--viewer", "serve", "--json", "figures.json"]
@@ -36,7 +36,7 @@ def real(minutes: float, folder: Path) -> Soaked:
     (kept,) = (folder / "runs").iterdir()
     troubles = [f"it ended with exit code {process.returncode}"] if process.returncode else []
     troubles += [f"{name}: never seen" for name in _PROGRAMS.values() if name not in memory.growth]
-    return Soaked(
+    return SoakResult(
         minutes, time.monotonic() - began, cpu, memory, figures["dropped_periods"],
         periods_in(kept / "run.mcap"), figures["periods"], size_mb(kept / "run.mcap"),
         size_mb(kept / "run.rrd"), troubles,

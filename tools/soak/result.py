@@ -18,7 +18,7 @@ _LAST_LOOK_MINUTES = 2.0  # before the end, by which every process is still seen
 
 
 @dataclass(slots=True)
-class Soaked:
+class SoakResult:
     """Result of a soak.
 
     Parameters

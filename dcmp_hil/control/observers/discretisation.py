@@ -25,7 +25,7 @@ class ObserverGains(NamedTuple):
     k3: float
 
 
-class Copy(NamedTuple):
+class LuenbergerCopy(NamedTuple):
     """z <- F z + Gu u + H0 y_(k-1) + H1 y_k: eq. (6) solved exactly over one step."""
 
     f11: float
@@ -61,7 +61,7 @@ def matched_gains(x: float) -> ObserverGains:
     return ObserverGains(p1 - p2 + 0.5 * p3, p2 - p3, p3)
 
 
-def luenberger_copy(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
+def luenberger_copy(dt: float, f0: float, gain1: float, gain2: float) -> LuenbergerCopy:
     """Solve eq. (6) over `dt` for u held and y linear between the samples.
 
     Parameters
@@ -80,10 +80,12 @@ def luenberger_copy(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
     e = _expm(generator * dt)
     h1 = e[:2, 4] / dt
     h0 = e[:2, 3] - h1
-    return Copy(*e[0, :2].tolist(), *e[1, :2].tolist(), *e[:2, 2].tolist(), *h0.tolist(), *h1.tolist())
+    return LuenbergerCopy(
+        *e[0, :2].tolist(), *e[1, :2].tolist(), *e[:2, 2].tolist(), *h0.tolist(), *h1.tolist()
+    )
 
 
-def copy_step(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
+def copy_step(dt: float, f0: float, gain1: float, gain2: float) -> LuenbergerCopy:
     """Solve the same as `luenberger_copy`, for a step that comes once: without a matrix, in microseconds.
 
     By Cayley and Hamilton every power of the 2x2 matrix A of eq. (6) is a A + b I; so the three series
@@ -109,7 +111,7 @@ def copy_step(dt: float, f0: float, gain1: float, gain2: float) -> Copy:
     p1, p2 = i0 * gain1 + i1 * (gain2 - gain1 * gain1), i0 * gain2 - i1 * gain2 * (gain1 + f0)
     q1, q2 = d0 * gain1 + d1 * (gain2 - gain1 * gain1), d0 * gain2 - d1 * gain2 * (gain1 + f0)
     h11, h12 = q1 / dt, q2 / dt
-    return Copy(
+    return LuenbergerCopy(
         e0 - gain1 * e1, e1, -gain2 * e1, e0 - f0 * e1, i1, i0 - f0 * i1, p1 - h11, p2 - h12, h11, h12
     )
 

@@ -228,7 +228,8 @@ class SuperTwisting:
         self._L2 = L2
         self._w1, self._w2 = L2 + self._f0 * self._L1, self._L1 + self._f0
         # An innovation at least this large is slower than the floor.
-        self._floor_from = self.M / self.mu0**3 if self.mu0 > 0.0 else math.inf
+        cube = self.mu0**3  # 0 of a floor so small that it is none
+        self._floor_from = self.M / cube if cube > 0.0 else math.inf
 
     def _restart(self, t: float, y: float) -> Estimate:
         """Begin at rest where the arm is: never at 0, which would be a step of the whole position."""

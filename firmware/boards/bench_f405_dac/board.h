@@ -3,6 +3,7 @@
 #define BOARD_H
 
 #define BOARD_NUMBER 3
+#define BOARD_PACKAGE_PINS 64u
 #define BOARD_CRYSTAL_HZ 8000000u
 #define BOARD_FLASH_KIB 1024u
 #define BOARD_RAM_KIB 128u

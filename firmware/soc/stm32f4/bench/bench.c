@@ -203,7 +203,7 @@ static void start_serial(void)
 
 static void start_can(void)
 {
-    static const uint16_t heard[] = {DCMP_STOP, DCMP_DRIVE, DCMP_HELLO, DCMP_PARAMETER_GET, DCMP_PARAMETER_SET};
+    static const uint16_t heard[] = DCMP_FROM_HOST;
     uint16_t ids[sizeof heard / sizeof heard[0]];
     for (uint32_t i = 0; i < sizeof heard / sizeof heard[0]; i++) {
         ids[i] = (uint16_t)(heard[i] | board.settings.config.node);

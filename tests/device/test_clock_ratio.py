@@ -1,4 +1,4 @@
-"""The device's clock from arrivals, and ticks of two devices in one stream."""
+"""The device's clock from arrivals."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import random
 import pytest
 
 from dcmp_hil.device.clock_ratio import ClockRatio
-from dcmp_hil.device.node_uniqueness import TickWatch
-from dcmp_hil.wire.messages import SampleReport, State
 
 PERIOD_NS = 1e6  # ns
 
@@ -46,36 +44,3 @@ def test_clock_that_goes_wrong_later_is_found_within_2200_ticks(right: int, erro
 
 def test_clock_is_not_known_at_once() -> None:
     assert arrivals(0.1, 600).error is None
-
-
-def sample(tick: int, counts: int = 0) -> SampleReport:
-    return SampleReport(counts, 0, tick % 256, State.IDLE, missed=True, limited=False, fault_class=0)
-
-
-def watch(*samples: SampleReport) -> TickWatch:
-    found = TickWatch()
-    for one in samples:
-        found.add(one)
-    return found
-
-
-@pytest.mark.parametrize("apart", [-100, -2, -1, 0, 1, 2, 50, 127])
-def test_two_devices_show_at_any_distance_of_their_ticks(apart: int) -> None:
-    both = [one for k in range(20) for one in (sample(k), sample(k + apart, 5))]
-    assert watch(*both).two_devices
-
-
-@pytest.mark.parametrize(
-    "samples",
-    [
-        [sample(k) for k in range(100)],
-        [sample(k) for k in range(250, 350)],
-        [one for k in range(50) for one in (sample(k), sample(k))],  # frames that come twice
-        [sample(k) for k in range(0, 100, 5)],
-        [sample(k) for k in (*range(50), *range(40))],  # a reset
-        [sample(k ^ 1) if k % 16 < 2 else sample(k) for k in range(64)],  # now and then out of order
-        [sample(0)],
-    ],
-)
-def test_one_device_is_not_taken_for_two(samples: list[SampleReport]) -> None:
-    assert not watch(*samples).two_devices
