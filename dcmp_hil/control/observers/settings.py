@@ -59,6 +59,11 @@ class ObserverSettings(Section, ABC):
         """Return the keys that may change in a run; if there are any, the observer has `retune`."""
         return ()
 
+    @classmethod
+    def at_start(cls) -> tuple[str, ...]:
+        """Return the keys that act at the start of a run only: a change of one waits for the next start."""
+        return ()
+
     def tuning(self, context: ObserverContext) -> object:  # noqa: ARG002
         """Return what the observer's `retune` takes: small, and without pydantic."""
         return None

@@ -130,6 +130,8 @@ class FrictionKalman:
             return self._begin(t, y)
         u, f0, gravity = self._ku * voltage, self._f0, self._gravity
         x1, x2, d, f, s = self.state
+        if not math.isfinite(x1 + x2 + y + voltage):
+            return self._lose(t)
         x1, x2, d, s, a, direction = moved(x1, x2, d, f, s, step, u, f0, gravity)
 
         m, slope_m, _, _, _, scatter = trust = self.trust
@@ -175,6 +177,12 @@ class FrictionKalman:
         # fmt: on
         self.trust, self.sticks, self.steps = BELIEVED, False, 0
         return Estimate(y, 0.0, 0.0)
+
+    def _lose(self, t: float) -> Estimate:
+        """Estimate no number from here on, as R1: one that came was not finite."""
+        self._t = t
+        self.state = (math.nan,) * 5
+        return Estimate(math.nan, math.nan, math.nan)
 
     def _rise(self, y: float) -> int:
         """Take the count at `y`, rad, and return by how many it rose."""

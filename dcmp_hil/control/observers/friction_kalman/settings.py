@@ -48,8 +48,13 @@ class FrictionKalmanSettings(ObserverSettings):
 
     @classmethod
     def tunable(cls) -> tuple[str, ...]:
-        """Return the keys that may change in a run; `f1_uncertainty` acts at the start only."""
+        """Return the keys that may change in a run."""
         return ("d_noise", "edge_counts")
+
+    @classmethod
+    def at_start(cls) -> tuple[str, ...]:
+        """Return the key of the variance that the friction level starts with."""
+        return ("f1_uncertainty",)
 
     def tuning(self, context: ObserverContext) -> FrictionKalmanTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
@@ -60,6 +65,6 @@ class FrictionKalmanSettings(ObserverSettings):
         if context.counts_per_rev is not None:
             return ""
         return (
-            "it measures by the edges of an encoder, and this one is ideal. Set encoder.counts_per_rev, or "
-            'observer.kind = "super_twisting".'
+            "friction_kalman measures by the edges of an encoder, and this one is ideal. Set "
+            'encoder.counts_per_rev, or observer.kind = "super_twisting".'
         )
