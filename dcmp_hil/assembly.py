@@ -11,7 +11,7 @@ from dcmp_hil.config.variation import expected_variation
 from dcmp_hil.control import controllers
 from dcmp_hil.control.friction_feedforward import FrictionFeedforward
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
-from dcmp_hil.control.predictor import Predictor
+from dcmp_hil.control.predictor import LinearPredictor
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.control.controllers import Controller
-    from dcmp_hil.control.observers import Observer
+    from dcmp_hil.control.observers import Observer, Predictor
     from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock
@@ -99,7 +99,7 @@ def assemble(
         backend=backend,
         outlier_filter=outlier_filter,
         observer=faults.observer(observer),
-        predictor=make_predictor(rig),
+        predictor=make_predictor(rig, observer),
         trajectory=trajectory,
         controller=faults.controller(controller),
         supervisor=supervisor,
@@ -131,10 +131,14 @@ def make_controller(rig: Rig) -> Controller:
     return controller_of(rig.controller, context, rig.plugin_folders)
 
 
-def make_predictor(rig: Rig) -> Predictor:
-    """Make what carries the estimate to the instant at which a command acts."""
-    measured = rig.controller.position == "measured"
-    return Predictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
+def make_predictor(rig: Rig, observer: Observer) -> Predictor:
+    """Make what carries the estimate to the instant at which a command acts: the observer's own, if any."""
+    measured, delay_samples = rig.controller.position == "measured", rig.loop.delay_samples
+    if not isinstance(rig.observer, Custom):
+        own = rig.observer.predictor(observer, rig.observer_context, delay_samples, measured=measured)
+        if own is not None:
+            return own
+    return LinearPredictor(rig.model.values(), rig.period, rig.loop.delay_samples, measured=measured)
 
 
 def make_supervisor(

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.backend import Backend
     from dcmp_hil.control.controllers import Controller
     from dcmp_hil.control.friction_feedforward import FrictionFeedforward
-    from dcmp_hil.control.observers import Observer
-    from dcmp_hil.control.predictor import Predictor
+    from dcmp_hil.control.observers import Observer, Predictor
     from dcmp_hil.live.live_changes import Changes
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
@@ -163,8 +162,8 @@ def run(stages: LoopStages, until: float, stop: StopFlag) -> float:
             trajectory.hold(estimate.position)
         if supervisor.engages(sample):
             trajectory.begin(t, estimate.position)
-        ahead = predictor.ahead(sample, estimate)
         reference = supervisor.limit_reference(sample, trajectory.at(t + delay))
+        ahead = predictor.ahead(sample, estimate, reference)
         demand = controller.update(reference, ahead)
         voltage = supervisor.safe_voltage(sample, estimate, demand)
         backend.write(voltage)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from typing import TYPE_CHECKING, Self
 
 from dcmp_hil.errors import LinkError
@@ -44,6 +45,8 @@ class SimBackend:
         self._period = rig.period
         self._skips = rig.timing.overrun == "skip"
         self._tick = 0
+        self._lost = rig.sim.lost_samples
+        self._losing = random.Random(f"lost {rig.sim.seed}")  # noqa: S311 - it must repeat itself
         self._plant = faults.plant(make_plant(rig))
         self._encoder = faults.encoder(make_encoder(rig))
         self._amplifier = Amplifier(
@@ -83,11 +86,21 @@ class SimBackend:
         if tick:
             voltage = self._amplifier.step()
             self._truth = self._plant.advance(voltage)
+            if self._lost:
+                voltage, tick = self._lose(voltage, tick)
             if self._skips:
                 voltage, tick = self._skip_to_newest(voltage, tick)
         self._tick = tick + 1
         self._pace.wait_for(tick)
         return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+
+    def _lose(self, voltage: float, tick: int) -> tuple[float, int]:
+        """Simulate periods whose samples are lost; return the voltage of the last one, V, and its tick."""
+        while self._losing.random() < self._lost:
+            voltage = self._amplifier.step()
+            self._truth = self._plant.advance(voltage)
+            tick += 1
+        return voltage, tick
 
     def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
         """Simulate the periods that are due already; return the voltage of the last one, V, and its tick."""

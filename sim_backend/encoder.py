@@ -22,13 +22,21 @@ class Encoder:
     noise
         Counts (rad with an ideal encoder), standard deviation of a Gaussian before the quantiser.
     seed
-        Of the noise.
+        Of the noise, and of the places of the edges.
+    edges
+        Counts: each edge of a turn lies up to this far from its place, at most half a count.
     """
 
-    def __init__(self, counts_per_rev: float | None, *, phase: float, noise: float, seed: int) -> None:
+    def __init__(
+        self, counts_per_rev: float | None, *, phase: float, noise: float, seed: int, edges: float = 0.0
+    ) -> None:
         self._count = 2.0 * math.pi / counts_per_rev if counts_per_rev else None
         self._phase = phase
         self._noise = noise
+        self._edges: list[float] = []  # counts, of each edge of a turn from its place
+        if counts_per_rev and edges:
+            places = random.Random(f"edges {seed}")  # noqa: S311 - as below
+            self._edges = [places.uniform(-edges, edges) for _ in range(math.ceil(counts_per_rev))]
         self._random = random.Random(seed)  # noqa: S311 - a simulation must repeat itself, not be secret
 
     def read(self, position: float) -> float:
@@ -50,7 +58,11 @@ class Encoder:
         counts = position / self._count + self._phase
         if self._noise:
             counts += self._random.gauss(0.0, self._noise)
-        return math.floor(counts + 0.5)
+        count = math.floor(counts + 0.5)
+        if self._edges:
+            lower, upper = (self._edges[edge % len(self._edges)] for edge in (count, count + 1))
+            count += (counts >= count + 0.5 + upper) - (counts < count - 0.5 + lower)
+        return count
 
 
 def make_encoder(rig: Rig) -> Encoder:
@@ -60,4 +72,5 @@ def make_encoder(rig: Rig) -> Encoder:
         phase=rig.sim.encoder_phase_counts,
         noise=rig.sim.encoder_noise_counts,
         seed=rig.sim.seed,
+        edges=rig.sim.encoder_edge_counts,
     )

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.values import Truth
+from sim_backend.detailed_plant import DetailedPlant
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -118,7 +119,9 @@ def make_plant(rig: Rig) -> Plant:
     """Make the plant that a rig's `[sim]` and `[model]` describe."""
     module, _, name = rig.sim.plant_class.partition(":")
     steps = rig.plant_steps
-    plant: Plant = getattr(import_module(module), name)(
-        rig.plant, rig.model.values(), position=rig.sim.position_rad, step=rig.period / steps, steps=steps
-    )
+    place = {"position": rig.sim.position_rad, "step": rig.period / steps}
+    details = rig.sim.details
+    if details is not None:
+        return DetailedPlant(rig.plant, rig.model.values(), details, **place, steps=steps)
+    plant: Plant = getattr(import_module(module), name)(rig.plant, rig.model.values(), **place, steps=steps)
     return plant

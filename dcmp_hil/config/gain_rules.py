@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.number_range import number
+from dcmp_hil.config.formatting import toml_value
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.settings import ObserverLimits, ObserverSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
@@ -135,5 +136,6 @@ def _blamed(rig: RigTables) -> str:
         default = type(section).model_fields[name].default
         usual = rig.model_copy(update={table: section.model_copy(update={name: default})})
         if holds(usual):
-            return f"{table}.{name}: got {number(getattr(section, name))};"
+            got = getattr(section, name)
+            return f"{table}.{name}: got {toml_value(got) if isinstance(got, str) else number(got)};"
     return "controller.kp_1_s2:"

@@ -22,6 +22,10 @@ BACKENDS = (
 )
 OBSERVERS = (
     "dcmp_hil.control.observers.super_twisting:SuperTwistingSettings",
+    "dcmp_hil.control.observers.friction_kalman.settings:FrictionKalmanSettings",
+    "dcmp_hil.control.observers.derivative:DerivativeSettings",
+    "dcmp_hil.control.observers.extended_state:ExtendedStateSettings",
+    "dcmp_hil.control.observers.kalman:KalmanSettings",
     "dcmp_hil.control.observers.paper:PaperSettings",
 )
 CONTROLLERS = (

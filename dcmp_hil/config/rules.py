@@ -49,6 +49,33 @@ def _step_divides_period(rig: RigTables) -> str:
     )
 
 
+def _details_need_moreau(rig: RigTables) -> str:
+    if rig.sim.integrator == "moreau" or rig.sim.details is None:
+        return ""
+    return (
+        'sim.integrator: got "euler", the paper\'s own simulation, which has neither Stribeck friction nor '
+        'bristles nor cogging. Write "moreau", or leave these keys of [sim] at 0.'
+    )
+
+
+def _samples_lost_where_there_is_no_wire(rig: RigTables) -> str:
+    if not rig.sim.lost_samples or not rig.backend.device:
+        return ""
+    return (
+        'sim.lost_samples: it is for backend.kind = "sim", which has no wire. With a wire, lose its '
+        "frames: --fault wire.drop:p=0.05."
+    )
+
+
+def _friction_has_one_owner(rig: RigTables) -> str:
+    if not (rig.controller.feeds_friction_forward and rig.observer.knows_friction):
+        return ""
+    return (
+        f'controller.friction_feedforward: got true, and observer.kind = "{rig.observer.kind}" compensates '
+        "friction already. Set it to false, or take another observer."
+    )
+
+
 def _floor_below_rate(rig: RigTables) -> str:
     mu0 = getattr(rig.observer, "mu0_rad_s", None)
     if mu0 is None or mu0 * rig.period <= 0.3 + 1e-9:
@@ -251,6 +278,9 @@ def _beyond_reason(name: str, section: Section) -> Iterator[str]:
 RULES: tuple[Callable[[RigTables], str], ...] = (
     _within_reason,
     _step_divides_period,
+    _details_need_moreau,
+    _samples_lost_where_there_is_no_wire,
+    _friction_has_one_owner,
     _floor_below_rate,
     _simulation_only,
     _whole_units,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from dcmp_hil.common.section import Section
-from dcmp_hil.control.model import Model
+from dcmp_hil.control.model import Model, PlantDetails
 
 PLANTS = {
     "moreau": ("sim_backend.plant:MoreauPlant", "friction that can stick"),
@@ -128,6 +128,20 @@ class SimSection(Section):
     """Offset of the encoder's zero between two edges, counts."""
     encoder_noise_counts: Annotated[float, Field(ge=0, le=10_000)] = 0.0
     """Noise before the quantiser, standard deviation, counts (rad with an ideal encoder)."""
+    encoder_edge_counts: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Each edge of a turn lies up to this far from its place, either way, counts."""
+    lost_samples: Annotated[float, Field(ge=0, le=0.9)] = 0.0
+    """Probability that a sample does not reach the host; the amplifier holds its voltage."""
+    stribeck_ratio: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Friction at rest over that in motion, minus 1: f1 (1 + ratio exp(-(v/stribeck_rad_s)^2))."""
+    stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100)] = 0.05
+    """Velocity over which the friction falls from that at rest to that in motion, rad/s."""
+    bristle_mrad: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Soft friction (LuGre): deflection at which the arm breaks away, mrad; 0 sticks rigidly."""
+    cogging_rad_s2: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Cogging of the motor, an acceleration of this amplitude, rad/s2."""
+    cogging_per_rev: Annotated[int, Field(ge=1, le=1000)] = 24
+    """Periods of the cogging in a turn."""
     dead_zone_V: Annotated[float, Field(ge=0, le=100)] = 0.0
     """The amplifier's output is 0 V below this, V."""
     voltage_step_mV: Annotated[float, Field(ge=0, le=10_000)] = 0.0
@@ -136,6 +150,19 @@ class SimSection(Section):
     """Seed of all noise: the same seed gives the same run to the bit."""
     plant: ModelSection = ModelSection()
     """`[sim.plant]`: keys of [model] that differ in the simulated plant; the rest is as in [model]."""
+
+    @property
+    def details(self) -> PlantDetails | None:
+        """Properties of the simulated motor beyond the model; None without any."""
+        if not (self.stribeck_ratio or self.bristle_mrad or self.cogging_rad_s2):
+            return None
+        return PlantDetails(
+            stribeck_ratio=self.stribeck_ratio,
+            stribeck=self.stribeck_rad_s,
+            bristle=1e-3 * self.bristle_mrad,
+            cogging=self.cogging_rad_s2,
+            cogging_per_rev=self.cogging_per_rev,
+        )
 
     @property
     def plant_class(self) -> str:
@@ -208,6 +235,8 @@ class Custom(Section):
     """`module:Class`; the module is installed, or beside the rig file, or in the current folder."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Keyword arguments for the constructor of the class."""
+
+    knows_friction: ClassVar[bool] = False
 
 
 class CustomController(Custom):

@@ -36,4 +36,14 @@ class Model(NamedTuple):
         return self.eta + self.eta_amplitude * math.sin(self.eta_rate * t)
 
 
+class PlantDetails(NamedTuple):
+    """Properties of a simulated motor beyond the model."""
+
+    stribeck_ratio: float  # friction at rest over that in motion, minus 1
+    stribeck: float  # rad/s
+    bristle: float  # rad, deflection at which it breaks away; 0 sticks
+    cogging: float  # rad/s2
+    cogging_per_rev: int
+
+
 UNKNOWN_MODEL = Model(*[math.nan] * len(Model._fields))

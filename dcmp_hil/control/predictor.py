@@ -10,13 +10,13 @@ from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
     from dcmp_hil.control.model import Model
-    from dcmp_hil.values import Sample
+    from dcmp_hil.values import Reference, Sample
 
 
 _NEGLIGIBLE_F0_PERIOD, _SERIES_F0_PERIOD_MAX = 1e-17, 1e-2  # of f0 T; below the first, 1 - f0 T is 1
 
 
-class Predictor:
+class LinearPredictor:
     """Exact prediction of x'' = -f0 x' + w + (ku/J) V with w and V held over each period.
 
     Parameters
@@ -38,7 +38,7 @@ class Predictor:
         self._delayed = delay_samples == 1
         self._under_way = 0.0  # V
 
-    def ahead(self, sample: Sample, estimate: Estimate) -> Estimate:
+    def ahead(self, sample: Sample, estimate: Estimate, _: Reference) -> Estimate:
         """Return the state at the instant at which the next command takes effect."""
         x1, x2, w = estimate
         if self._measured:

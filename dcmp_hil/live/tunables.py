@@ -119,14 +119,19 @@ def allowed(rig: Rig, key: str, value: float) -> bool:
 def _refuse(rig: Rig, keys: list[str]) -> None:
     if keys:
         raise ConfigError(
-            *(f"{key} cannot be changed in a run{_own(rig, key)}." for key in keys),
+            *(f"{key} cannot be changed in a run{_why(rig, key)}." for key in keys),
             f"These can: {', '.join(settable(rig))}.",
         )
 
 
-def _own(rig: Rig, key: str) -> str:
-    section = getattr(rig, key.partition(".")[0], None)
-    return f": {section.kind} is a class of your own" if isinstance(section, Custom) else ""
+def _why(rig: Rig, key: str) -> str:
+    table, _, name = key.partition(".")
+    section = getattr(rig, table, None)
+    if isinstance(section, Custom):
+        return f": {section.kind} is a class of your own"
+    if isinstance(section, ObserverSettings) and name in section.at_start():
+        return ": it acts at the next start"
+    return ""
 
 
 def _known(rig: Rig, key: str) -> bool:

@@ -116,7 +116,7 @@ def _reexecute(
         backend=backend,
         outlier_filter=OutlierFilter(math.inf, rig.period, rig.encoder.count),  # outliers are missing already
         observer=observer,
-        predictor=make_predictor(rig),
+        predictor=make_predictor(rig, observer),
         trajectory=RecordedTrajectory(backend, trajectory),
         controller=controller,
         supervisor=RecordedSupervisor(backend),

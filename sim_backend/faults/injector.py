@@ -13,7 +13,7 @@ from sim_backend.faults.faulty_link import FaultyLink
 from sim_backend.faults.firmware import Start, WrongClock
 from sim_backend.faults.host import HostFault
 from sim_backend.faults.listener import FaultListener
-from sim_backend.faults.plant import FaultyEncoder, FaultyPlant, PlantFault
+from sim_backend.faults.plant_fault import FaultyEncoder, FaultyPlant, PlantFault
 from sim_backend.faults.stages import FaultyBackend, FaultyController, FaultyObserver
 from sim_backend.faults.wire import WireFault
 

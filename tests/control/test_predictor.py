@@ -11,19 +11,20 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from dcmp_hil.control.model import Model
-from dcmp_hil.control.predictor import Predictor, held_input
-from dcmp_hil.values import Estimate, Sample
+from dcmp_hil.control.predictor import LinearPredictor, held_input
+from dcmp_hil.values import Estimate, Reference, Sample
 
 _SAMPLE = Sample(1.0, 0.31, 0.0)
 _ESTIMATE = Estimate(0.3, -0.7, 4.0)
+_REFERENCE = Reference(0.0, 0.0, 0.0)  # the linear prediction needs none
 
 
 @pytest.mark.parametrize("f0", [0.0, 1e-9, 0.1, 3.0, 100.0])  # 1/s
 @pytest.mark.parametrize("period", [5e-5, 1e-3, 0.1])  # s
 def test_predictor_equals_scipy_expm_when_a_command_is_under_way(f0: float, period: float) -> None:
-    predictor = Predictor(Model(f0=f0), period, 1)
+    predictor = LinearPredictor(Model(f0=f0), period, 1)
     predictor.sent(-2.5)
-    got = predictor.ahead(_SAMPLE, _ESTIMATE)
+    got = predictor.ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
     drive = 4.0 - 5.4 * 2.5  # rad/s2: w + (ku/J) V, eq. (4)
     step = expm(period * np.array([[0.0, 1.0, 0.0], [0.0, -f0, 1.0], [0.0, 0.0, 0.0]]))
     expected = step @ [0.3, -0.7, drive]
@@ -32,28 +33,31 @@ def test_predictor_equals_scipy_expm_when_a_command_is_under_way(f0: float, peri
 
 
 def test_predictor_sees_only_the_disturbance_when_nothing_was_sent_yet() -> None:
-    got = Predictor(Model(f0=0.0), 1e-3, 1).ahead(_SAMPLE, _ESTIMATE)
+    got = LinearPredictor(Model(f0=0.0), 1e-3, 1).ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
     assert tuple(got) == pytest.approx((0.3 - 0.7e-3 + 2e-6, -0.7 + 4e-3, 4.0), rel=1e-14, abs=0)
 
 
 def test_predictor_forgets_all_but_the_newest_command() -> None:
-    predictor, other = Predictor(Model(), 1e-3, 1), Predictor(Model(), 1e-3, 1)
+    predictor, other = LinearPredictor(Model(), 1e-3, 1), LinearPredictor(Model(), 1e-3, 1)
     predictor.sent(9.0)
     predictor.sent(1.0)
     other.sent(1.0)
-    assert predictor.ahead(_SAMPLE, _ESTIMATE) == other.ahead(_SAMPLE, _ESTIMATE)
+    assert predictor.ahead(_SAMPLE, _ESTIMATE, _REFERENCE) == other.ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
 
 
 def test_predictor_changes_nothing_when_the_command_acts_at_once() -> None:
-    predictor = Predictor(Model(), 1e-3, 0)
+    predictor = LinearPredictor(Model(), 1e-3, 0)
     predictor.sent(10.0)
-    assert predictor.ahead(_SAMPLE, _ESTIMATE) == _ESTIMATE
+    assert predictor.ahead(_SAMPLE, _ESTIMATE, _REFERENCE) == _ESTIMATE
 
 
 def test_predictor_starts_from_the_encoder_when_measured() -> None:
-    assert Predictor(Model(), 1e-3, 0, measured=True).ahead(_SAMPLE, _ESTIMATE).position == 0.31
-    carried = Predictor(Model(), 1e-3, 1, measured=True).ahead(_SAMPLE, _ESTIMATE)
-    quiet = Predictor(Model(), 1e-3, 1).ahead(_SAMPLE, _ESTIMATE)
+    assert (
+        LinearPredictor(Model(), 1e-3, 0, measured=True).ahead(_SAMPLE, _ESTIMATE, _REFERENCE).position
+        == 0.31
+    )
+    carried = LinearPredictor(Model(), 1e-3, 1, measured=True).ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
+    quiet = LinearPredictor(Model(), 1e-3, 1).ahead(_SAMPLE, _ESTIMATE, _REFERENCE)
     assert carried.position - quiet.position == pytest.approx(0.01, rel=1e-12, abs=0)
     assert carried[1:] == quiet[1:]
 

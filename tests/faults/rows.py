@@ -141,6 +141,10 @@ PLANT = (
         most_rad_s=15.0,
         rearms=False,  # it may hang on the other side of the top
     ),
+    Row("plant.push:rad_s2=15"),
+    Row("plant.sway:rad_s2=8,hz=0.3,for=1s"),
+    Row("plant.square:rad_s2=3,hz=0.4,for=1s"),
+    Row("plant.delay:periods=2"),
     Row("plant.cpr:factor=4,at=boot", frozenset({"gain"}), 600.0),
     Row("plant.cpr:factor=0.2,at=boot", frozenset({"gain"}), 600.0),
     Row("plant.cpr:factor=0.25,at=boot", frozenset({"gain", "power"}), 600.0),

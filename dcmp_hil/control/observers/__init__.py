@@ -4,7 +4,7 @@ from typing import NamedTuple, Protocol
 
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ProtocolError
-from dcmp_hil.values import Estimate, Sample
+from dcmp_hil.values import Estimate, Reference, Sample
 
 GAP_PERIODS_MAX = 10
 """Periods; after a longer gap nothing is left to continue from, and an observer restarts."""
@@ -17,6 +17,21 @@ class Observer(Protocol):
 
     def update(self, sample: Sample) -> Estimate:
         """Take the next sample and return the estimate at `sample.t`."""
+        ...
+
+
+class Predictor(Protocol):
+    """Protocol of a predictor: from the estimate at a sample to the state at which its command acts."""
+
+    def ahead(self, sample: Sample, estimate: Estimate, reference: Reference, /) -> Estimate:
+        """Return the state at the instant of `reference`, at which the next command takes effect.
+
+        Its disturbance is the one to compensate there.
+        """
+        ...
+
+    def sent(self, voltage: float, /) -> None:
+        """Remember what was just sent, V: it is under way until the next sample."""
         ...
 
 
@@ -46,4 +61,11 @@ def standing_still(before: float, t: float) -> ProtocolError:
     )
 
 
-__all__ = ["GAP_PERIODS_MAX", "STEP_TOLERANCE_PERIODS", "Observer", "ObserverContext", "standing_still"]
+__all__ = [
+    "GAP_PERIODS_MAX",
+    "STEP_TOLERANCE_PERIODS",
+    "Observer",
+    "ObserverContext",
+    "Predictor",
+    "standing_still",
+]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcmp_hil.common.section import Section
 
 if TYPE_CHECKING:
-    from dcmp_hil.control.observers import Observer, ObserverContext
+    from dcmp_hil.control.observers import Observer, ObserverContext, Predictor
 
 
 class ObserverLimits(NamedTuple):
@@ -33,9 +33,35 @@ class ObserverSettings(Section, ABC):
     def build(self, context: ObserverContext) -> Observer:
         """Make the observer for a rig."""
 
+    def predictor(
+        self,
+        observer: Observer,  # noqa: ARG002
+        context: ObserverContext,  # noqa: ARG002
+        delay_samples: int,  # noqa: ARG002
+        *,
+        measured: bool,  # noqa: ARG002
+    ) -> Predictor | None:
+        """Return the observer's own predictor; None where `LinearPredictor` serves it.
+
+        Parameters
+        ----------
+        observer
+            As `build` returned it.
+        context
+            The rig served.
+        delay_samples, measured
+            As for `LinearPredictor`.
+        """
+        return None
+
     @classmethod
     def tunable(cls) -> tuple[str, ...]:
         """Return the keys that may change in a run; if there are any, the observer has `retune`."""
+        return ()
+
+    @classmethod
+    def at_start(cls) -> tuple[str, ...]:
+        """Return the keys that act at the start of a run only: a change of one waits for the next start."""
         return ()
 
     def tuning(self, context: ObserverContext) -> object:  # noqa: ARG002
@@ -45,6 +71,11 @@ class ObserverSettings(Section, ABC):
     def by_rule(self, name: str, context: ObserverContext) -> float | None:  # noqa: ARG002
         """Return what the rule makes of a key that was left out; None where there is no rule."""
         return None
+
+    @property
+    def knows_friction(self) -> bool:
+        """Whether the friction of `[model]` is part of the observer's own prediction."""
+        return False
 
     def warning(self, context: ObserverContext) -> str:  # noqa: ARG002
         """Return a warning of settings that are valid and rarely intended; empty without one."""
