@@ -71,7 +71,7 @@ def _resize(page: Chrome, width: int, height: int) -> None:
     script = (
         "const boxes = [...document.querySelectorAll('.canvas')];"
         "return innerWidth === arguments[0] && innerHeight === arguments[1] && boxes.length === 5"
-        " && boxes.every((box) => Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
+        " && boxes.every((box) => box.firstChild && Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
         " && Math.abs(box.clientHeight - box.firstChild.clientHeight) < 2)"
     )
     until(lambda: page.execute_script(script, width, height), "the plots had the page's size")
@@ -246,6 +246,7 @@ def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_m
         assert _module(page, "return getComputedStyle(document.querySelector('#charts')).opacity") == "1"
         panel.send_signal(signal.SIGSTOP)  # the states are this test's from here on
         _one_cycle_is_drawn(page)
+        _a_fault_is_said_while_the_run_goes_on(page)
         _heap_stays(page, figure)
 
 
@@ -259,6 +260,16 @@ def _one_cycle_is_drawn(page: Chrome) -> None:
         "panel.take(given[0]); await new Promise(requestAnimationFrame);return plots.rangeOf('position')[1]"
     )
     until(lambda: _module(page, draw, state) > _OUTLIER_RAD, "the plot reached up to the one cycle")
+
+
+def _a_fault_is_said_while_the_run_goes_on(page: Chrome) -> None:
+    """Send a state with a fault of the device: the banner says cause and cure, in red, and goes with it."""
+    state = {"connection": "live", "pid": 1, "t_s": 1.1, "phase": "tripped", "fault": "It hung. Look at it."}
+    said = "panel.take(given[0]); const b = document.getElementById('banner');" + (
+        "return [b.textContent, b.className, b.hidden, b.getAttribute('role')]"
+    )
+    assert _module(page, said, state) == ["Fault: It hung. Look at it.", "bad", False, "alert"]
+    assert _module(page, said, {**state, "fault": "", "phase": "running"})[2] is True
 
 
 def _heap(page: Chrome) -> float:
