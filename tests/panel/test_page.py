@@ -71,7 +71,8 @@ def _resize(page: Chrome, width: int, height: int) -> None:
     script = (
         "const boxes = [...document.querySelectorAll('.canvas')];"
         "return innerWidth === arguments[0] && innerHeight === arguments[1] && boxes.length === 5"
-        " && boxes.every((box) => box.firstChild && Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
+        " && boxes.every((box) => box.firstChild"
+        " && Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
         " && Math.abs(box.clientHeight - box.firstChild.clientHeight) < 2)"
     )
     until(lambda: page.execute_script(script, width, height), "the plots had the page's size")
@@ -265,7 +266,8 @@ def _one_cycle_is_drawn(page: Chrome) -> None:
 def _a_fault_is_said_while_the_run_goes_on(page: Chrome) -> None:
     """Send a state with a fault of the device: the banner says cause and cure, in red, and goes with it."""
     state = {"connection": "live", "pid": 1, "t_s": 1.1, "phase": "tripped", "fault": "It hung. Look at it."}
-    said = "panel.take(given[0]); const b = document.getElementById('banner');" + (
+    said = (
+        "panel.take(given[0]); const b = document.getElementById('banner');"
         "return [b.textContent, b.className, b.hidden, b.getAttribute('role')]"
     )
     assert _module(page, said, state) == ["Fault: It hung. Look at it.", "bad", False, "alert"]
