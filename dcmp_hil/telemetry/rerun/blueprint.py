@@ -52,7 +52,7 @@ def dashboard(rig: RigView, *, tripped: bool = False) -> rrb.Blueprint:
         _banner(),
         rrb.Horizontal(happens, rrb.Vertical(*wrong, timing)),
         states,
-        row_shares=[15, 70, 15] if tripped else [8, 77, 15],
+        row_shares=[16, 69, 15] if tripped else [8, 77, 15],
     )
     return opened(rrb.Horizontal(left, right, column_shares=[_LEFT_SHARE, 100 - _LEFT_SHARE]))
 
