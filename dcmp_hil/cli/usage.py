@@ -37,11 +37,13 @@ class Commands(TyperGroup):
 def sentence(error: TyperException) -> str:
     """Return what is wrong with a command line, the option that was meant, and where its help is."""
     context: Any = getattr(error, "ctx", None)
-    text = error.format_message().replace(_COERCION_PREFIX, "")
+    text = " ".join(error.format_message().replace(_COERCION_PREFIX, "").split())
     option = getattr(error, "option_name", None)
     if context is None:
         return text
     if option is not None and hasattr(error, "possibilities"):
-        known = [name for one in context.command.get_params(context) for name in one.opts]
+        known = [
+            name for one in context.command.get_params(context) for name in one.opts if name.startswith("-")
+        ]
         text = " ".join(filter(None, (f"No such option: {option}.", did_you_mean(option, known, shown=str))))
     return f"{text.rstrip('.?')}{'?' if text.endswith('?') else '.'} See `{context.command_path} --help`."

@@ -93,6 +93,8 @@ def test_an_example_without_a_device_runs(cli: Callable[..., Outcome], example: 
         (("run", "--viewer", "wbe"), "Invalid value for '--viewer': 'wbe' is not one of 'spawn', 'web', "),
         (("run", "--duration"), "Option '--duration' requires an argument."),
         (("check", "bench-1khz", "paper"), "Got unexpected extra argument(s) (paper)."),
+        (("completion",), "Missing argument 'SHELL'. Choose from: bash, zsh, fish. See "),
+        (("completion", "bash", "--shell"), "No such option: --shell. Did you mean --help?"),
         (("replay",), "Missing argument 'FILE'. See `dcmp-hil replay --help`."),
     ],
 )

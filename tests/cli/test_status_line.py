@@ -7,8 +7,12 @@ import math
 import os
 import pty
 import re
+import select
+import signal
 import struct
+import subprocess
 import termios
+import time
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -18,14 +22,17 @@ from rich.console import Console
 
 from dcmp_hil.cli.status_line import Field, StatusLine, fitted
 from dcmp_hil.values import Event, EventKind, PhaseData
+from tests.installed import environment
 from tests.telemetry.runs import T, blocks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 NAMES = re.compile(r"running|pos(?:ition)?|err(?:or)?|voltage|\bu\b|\bw\b|late\b|lateness|[\d.]+ s\b")
 RUNNING = Event(0.0, "INFO", EventKind.PHASE, "it runs", PhaseData("running"))
 WITHOUT_UNIT = 40
+TIMEOUT_S = 120.0
 
 
 def line_on(columns: int) -> str:
@@ -98,22 +105,22 @@ def test_wide_characters_are_counted_by_columns() -> None:
 
 
 @pytest.fixture
-def terminal() -> Iterator[tuple[int, Callable[[int], None]]]:
-    """Yield the end of a pseudo terminal that programs write to, and what sets its width."""
+def terminal() -> Iterator[tuple[int, int, Callable[[int], None]]]:
+    """Yield the end of a pseudo terminal that is read, the end of programs, and what sets its width."""
     ours, theirs = pty.openpty()
 
     def resize(columns: int) -> None:
         fcntl.ioctl(ours, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
 
-    yield theirs, resize
+    yield ours, theirs, resize
     os.close(ours)
     os.close(theirs)
 
 
 def test_a_resize_during_a_run_changes_the_next_line(
-    terminal: tuple[int, Callable[[int], None]], monkeypatch: pytest.MonkeyPatch
+    terminal: tuple[int, int, Callable[[int], None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    theirs, resize = terminal
+    _, theirs, resize = terminal
     monkeypatch.setenv("TERM", "xterm")
     with os.fdopen(os.dup(theirs), "w") as file:
         console = Console(file=file, force_terminal=True, color_system=None)
@@ -127,3 +134,46 @@ def test_a_resize_during_a_run_changes_the_next_line(
             assert cell_len(drawn) <= columns
             assert ("lateness" in drawn, " mrad" in drawn) == (columns == 200, columns > 40)
         line.close()
+
+
+def test_a_run_follows_the_terminal_of_its_standard_error(
+    installed: Path, terminal: tuple[int, int, Callable[[int], None]], tmp_path: Path
+) -> None:
+    """Its other streams are no terminal, and the line is drawn by another process of the run."""
+    ours, theirs, resize = terminal
+    resize(120)
+    command = (*("run", "--duration", "0", "--no-record"), *("--viewer", "none", "--no-control"))
+    with subprocess.Popen(
+        [installed, *command, "--set", "supervisor.monitors=finite"],
+        cwd=tmp_path,
+        env=environment(TERM="xterm", COLUMNS=None),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=theirs,
+    ) as process:
+        try:
+            _drawn(ours, lambda line: 80 < len(line) <= 120 and "position" in line)
+            resize(60)
+            _drawn(ours, lambda line: len(line) <= 60 and " mrad  w " in line)
+            process.send_signal(signal.SIGINT)
+            end = time.monotonic() + TIMEOUT_S
+            while process.poll() is None and time.monotonic() < end:
+                _lines(ours)
+        finally:
+            process.kill()
+    assert process.returncode == 0
+
+
+def _drawn(terminal: int, wanted: Callable[[str], bool]) -> None:
+    """Wait for a status line like that."""
+    end = time.monotonic() + TIMEOUT_S
+    while not any(re.search(r"late \d", line) and wanted(line) for line in _lines(terminal)):
+        assert time.monotonic() < end
+
+
+def _lines(terminal: int) -> list[str]:
+    """Return what was written in the last moments: each time a line is drawn, it is written whole."""
+    if not select.select([terminal], [], [], 0.2)[0]:
+        return []
+    shown = os.read(terminal, 65536).decode("utf-8", "replace")
+    return re.split(r"[\r\n]+", re.sub(r"\x1b\[[?\d;]*[a-zA-Z]", "", shown))

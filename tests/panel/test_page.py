@@ -16,6 +16,7 @@ from dcmp_hil.live.envelopes import COLUMNS, HISTORY_S
 from dcmp_hil.live.tunables import value_of
 from tests.live.processes import TIMEOUT_S, own_folder, started, until, until_running
 from tests.panel.browser import browser, needed
+from tests.panel.layout import CLIPPED, PICTURES, check_axes, check_size, module, resize, text, within
 from tests.panel.test_browser import address_of, free_port
 
 if TYPE_CHECKING:
@@ -24,33 +25,11 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 _SIZES = [(1366, 768), (1600, 900), (1920, 1080), (412, 915), (915, 412)]
-_PHONE_PX = 915  # longer side of a phone's screen
-_PICTURES = Path("reports/pictures")
-_PLOTS = ("position", "error", "voltage", "disturbance", "lateness")
 _HEAP_MB, _FRAME_S, _FRAMES_AT_ONCE = 20.0, 0.15, 200
 _TIME_S = float(
     os.environ.get("DCMP_PANEL_S", "300")
 )  # of states that are pushed; `make panel-hour` asks 3,600
 _OUTLIER_RAD = 3.21
-
-# What sticks out of its tile, by as little as a pixel.
-_CLIPPED = """
-const names = ".number, .number *, header *, .deeds *, .knob, .knob *, #banner, figcaption";
-return [...document.querySelectorAll(names)]
-  .filter((e) => e.getClientRects().length && getComputedStyle(e).display !== "inline")
-  .filter((e) => e.scrollWidth > e.clientWidth + 1
-    || (e.closest(".number") && e.scrollHeight > e.clientHeight + 1))
-  .map((e) => `${e.tagName} ${e.id} ${e.textContent}`)
-"""
-_OVERLAPPING = """
-const names = ".number h2, .number b, .number p span, .number em, header > *";
-const boxes = [...document.querySelectorAll(names)].filter((e) => e.getClientRects().length)
-  .map((e) => [e.id || e.textContent, e.getBoundingClientRect()]);
-return boxes.flatMap(([a, p], k) => boxes.slice(k + 1)
-  .filter(([, q]) => p.left < q.right - 1 && q.left < p.right - 1)
-  .filter(([, q]) => p.top < q.bottom - 3 && q.top < p.bottom - 3)
-  .map(([b]) => [a, b]));
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -60,67 +39,8 @@ def _own_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-def _text(page: Chrome, name: str) -> str:
-    return str(page.execute_script("return document.getElementById(arguments[0])?.textContent", name))
-
-
-def _resize(page: Chrome, width: int, height: int) -> None:
-    """Give the page a size, and wait until its plots have it, too."""
-    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width <= _PHONE_PX}
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    script = (
-        "const boxes = [...document.querySelectorAll('.canvas')];"
-        "return innerWidth === arguments[0] && innerHeight === arguments[1] && boxes.length === 5"
-        " && boxes.every((box) => Math.abs(box.clientWidth - box.firstChild.clientWidth) < 2"
-        " && Math.abs(box.clientHeight - box.firstChild.clientHeight) < 2)"
-    )
-    until(lambda: page.execute_script(script, width, height), "the plots had the page's size")
-
-
-def _within(page: Chrome, name: str) -> bool:
-    """Return whether all of an element is on the screen, and a click in its middle reaches it."""
-    script = (
-        "const e = document.getElementById(arguments[0]); const b = e.getBoundingClientRect();"
-        "const hit = document.elementFromPoint(b.left + b.width / 2, b.top + b.height / 2);"
-        "return b.top >= 0 && b.left >= 0 && b.right <= innerWidth && b.bottom <= innerHeight"
-        " && b.height >= 40"
-        " && (hit === e || e.contains(hit))"
-    )
-    return bool(page.execute_script(script, name))
-
-
-def _module(page: Chrome, body: str, *arguments: object) -> Any:
-    """Run a script with the page's own modules as `panel`, `plots` and `trace`."""
-    script = (
-        "const done = arguments[arguments.length - 1]; const given = [...arguments].slice(0, -1);"
-        "Promise.all(['panel', 'plots', 'trace'].map((name) => import(`/${name}.js`)))"
-        f".then(async ([panel, plots, trace]) => {{ {body} }}).then(done, (e) => done(String(e)));"
-    )
-    return page.execute_async_script(script, *arguments)
-
-
-def _check_size(page: Chrome, width: int, height: int, name: str) -> None:
-    _resize(page, width, height)
-    page.save_screenshot(str(_PICTURES / f"panel-{name}-{width}x{height}.png"))
-    assert page.execute_script("return document.documentElement.scrollWidth") <= width
-    assert page.execute_script(_CLIPPED) == []
-    assert page.execute_script(_OVERLAPPING) == []
-    _check_axes(page)
-    assert _within(page, "stop")
-    page.execute_script("scrollTo(0, document.documentElement.scrollHeight)")
-    assert _within(page, "stop")
-    page.execute_script("scrollTo(0, 0)")
-
-
-def _check_axes(page: Chrome) -> None:
-    for plot in _PLOTS:
-        across, up = _module(page, "return plots.ticksOf(given[0])", plot)
-        assert across >= 3, plot
-        assert up >= (2 if plot == "lateness" else 3), plot
-
-
 def test_page_is_read_at_every_size_opens_with_history_and_writes_what_is_accepted(tmp_path: Path) -> None:
-    _PICTURES.mkdir(parents=True, exist_ok=True)
+    PICTURES.mkdir(parents=True, exist_ok=True)
     rig = tmp_path / "ours.toml"
     copy_rig("bench-1khz", rig)
     arguments = ("run", str(rig), "--viewer", "none", "--no-record", "--duration", "0")
@@ -133,17 +53,17 @@ def test_page_is_read_at_every_size_opens_with_history_and_writes_what_is_accept
         until(lambda: status(run.pid)["t_s"] > 4.0, "there is history")
         change(run.pid, ["controller.kp_1_s2=5200"])
         page.get(address_of(panel))
-        until(lambda: _text(page, "phase") == "running", "the page showed the phase")
-        first, last = _module(page, "return [trace.trace.t[0], trace.trace.t.at(-1)]")
+        until(lambda: text(page, "phase") == "running", "the page showed the phase")
+        first, last = module(page, "return [trace.trace.t[0], trace.trace.t.at(-1)]")
         assert last - first > min(last, HISTORY_S) - 0.5  # the page was not there
-        until(lambda: "5200" in _text(page, "applied-controller.kp_1_s2"), "the gain was read back")
+        until(lambda: "5200" in text(page, "applied-controller.kp_1_s2"), "the gain was read back")
         for width, height in _SIZES:
-            _check_size(page, width, height, "run")
-        _resize(page, 1366, 768)
+            check_size(page, width, height, "run")
+        resize(page, 1366, 768)
         _keys_reach_everything(page)
         _diff_is_accepted(page, rig)
         page.find_element("id", "back").click()
-        until(lambda: _text(page, "applied-controller.kp_1_s2") == "4000", "the gain is that of the start")
+        until(lambda: text(page, "applied-controller.kp_1_s2") == "4000", "the gain is that of the start")
         assert not page.find_element("id", "back").is_enabled()
         _drawing_that_fails_does_not_keep_from_stop(page)
         run.communicate(timeout=TIMEOUT_S)
@@ -176,18 +96,18 @@ def _keys_reach_everything(page: Chrome) -> None:
 def _diff_is_accepted(page: Chrome, rig: Path) -> None:
     """Refuse over a file that changed, then write; STOP stays within reach meanwhile."""
     page.find_element("id", "write").click()
-    until(lambda: "+kp_1_s2 = 5200" in _text(page, "sheet-text"), "the diff was shown")
-    page.save_screenshot(str(_PICTURES / "panel-diff-1366x768.png"))
-    assert _within(page, "stop")
+    until(lambda: "+kp_1_s2 = 5200" in text(page, "sheet-text"), "the diff was shown")
+    page.save_screenshot(str(PICTURES / "panel-diff-1366x768.png"))
+    assert within(page, "stop")
     rig.write_text(rig.read_text("utf-8") + "# of mine\n", "utf-8")
     page.find_element("id", "sheet-accept").click()
-    until(lambda: "changed meanwhile" in _text(page, "sheet-said"), "it was refused")
+    until(lambda: "changed meanwhile" in text(page, "sheet-said"), "it was refused")
     assert "5200" not in rig.read_text("utf-8")
     page.find_element("id", "sheet-close").click()
     page.find_element("id", "write").click()
-    until(lambda: "+kp_1_s2 = 5200" in _text(page, "sheet-text"), "the diff was shown again")
+    until(lambda: "+kp_1_s2 = 5200" in text(page, "sheet-text"), "the diff was shown again")
     page.find_element("id", "sheet-accept").click()
-    until(lambda: _text(page, "sheet-title") == "Written", "it was written")
+    until(lambda: text(page, "sheet-title") == "Written", "it was written")
     page.find_element("id", "sheet-close").click()
     assert value_of(load_rig(rig), "controller.kp_1_s2") == 5200.0
     assert rig.read_text("utf-8").endswith("# of mine\n")
@@ -195,22 +115,22 @@ def _diff_is_accepted(page: Chrome, rig: Path) -> None:
 
 def _drawing_that_fails_does_not_keep_from_stop(page: Chrome) -> None:
     """Break what draws, then take uPlot away, then the page's own script: STOP stops."""
-    _module(page, "window.uPlot.prototype = null; trace.trace.columns = null; trace.trace.t = null")
+    module(page, "window.uPlot.prototype = null; trace.trace.columns = null; trace.trace.t = null")
     _numbers_go_on(page)
-    assert "STOP works" in _text(page, "log")
+    assert "STOP works" in text(page, "log")
     _reload_without(page, "*uplot.js")
     _numbers_go_on(page)
-    until(lambda: "cannot draw its plots" in _text(page, "log"), "the page said what it lacks")
+    until(lambda: "cannot draw its plots" in text(page, "log"), "the page said what it lacks")
     _reload_without(page, "*panel.js")
-    assert _text(page, "phase") == "no run"  # it does not know better
+    assert text(page, "phase") == "no run"  # it does not know better
     page.find_element("id", "stop").click()
-    until(lambda: "STOP: confirmed" in _text(page, "log"), "STOP was confirmed")
+    until(lambda: "STOP: confirmed" in text(page, "log"), "STOP was confirmed")
 
 
 def _numbers_go_on(page: Chrome) -> None:
-    until(lambda: _text(page, "time"), "the time was shown")
-    shown = _text(page, "time")
-    until(lambda: _text(page, "time") != shown, "the numbers went on")
+    until(lambda: text(page, "time"), "the time was shown")
+    shown = text(page, "time")
+    until(lambda: text(page, "time") != shown, "the numbers went on")
 
 
 def _reload_without(page: Chrome, file: str) -> None:
@@ -222,7 +142,7 @@ def _reload_without(page: Chrome, file: str) -> None:
 def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_memory(
     tmp_path: Path, figure: Callable[[str], None]
 ) -> None:
-    _PICTURES.mkdir(parents=True, exist_ok=True)
+    PICTURES.mkdir(parents=True, exist_ok=True)
     arguments = ("run", "bench-1khz", "--viewer", "none", "--no-record", "--duration", "0")
     with (
         started(tmp_path, "panel", "--port", str(free_port())) as panel,
@@ -231,21 +151,22 @@ def test_a_trip_is_found_on_the_page_with_its_cause_and_states_do_not_grow_its_m
         page.get(address_of(panel))
         with started(tmp_path, *arguments, "--fault", "plant.enc_stuck:at=6s") as run:
             _, err = run.communicate(timeout=TIMEOUT_S)
-        until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
-        assert _text(page, "banner").startswith("Run ended: ")
-        sentence = _text(page, "banner").removeprefix("Run ended: ").partition(". ")[0]
+        until(lambda: text(page, "phase") == "run ended", "the page said that the run ended")
+        assert text(page, "banner").startswith("Run ended: ")
+        sentence = text(page, "banner").removeprefix("Run ended: ").partition(". ")[0]
         assert " ".join(sentence.split())[:60] in " ".join(err.split())
         assert page.execute_script("return document.getElementById('banner').className") == "bad"
         page.refresh()  # a page that is opened after the end
-        until(lambda: _module(page, "return trace.trace.t.length") > 100, "the last seconds were there")
+        until(lambda: module(page, "return trace.trace.t.length") > 100, "the last seconds were there")
         for width, height in _SIZES:
-            _resize(page, width, height)
-            page.save_screenshot(str(_PICTURES / f"panel-tripped-{width}x{height}.png"))
-            assert page.execute_script(_CLIPPED) == []
-            _check_axes(page)
-        assert _module(page, "return getComputedStyle(document.querySelector('#charts')).opacity") == "1"
+            resize(page, width, height)
+            page.save_screenshot(str(PICTURES / f"panel-tripped-{width}x{height}.png"))
+            assert page.execute_script(CLIPPED) == []
+            check_axes(page)
+        assert module(page, "return getComputedStyle(document.querySelector('#charts')).opacity") == "1"
         panel.send_signal(signal.SIGSTOP)  # the states are this test's from here on
         _one_cycle_is_drawn(page)
+        _a_fault_is_said_while_the_run_goes_on(page)
         _heap_stays(page, figure)
 
 
@@ -258,7 +179,18 @@ def _one_cycle_is_drawn(page: Chrome) -> None:
     draw = (  # again, should a state of before have been on its way
         "panel.take(given[0]); await new Promise(requestAnimationFrame);return plots.rangeOf('position')[1]"
     )
-    until(lambda: _module(page, draw, state) > _OUTLIER_RAD, "the plot reached up to the one cycle")
+    until(lambda: module(page, draw, state) > _OUTLIER_RAD, "the plot reached up to the one cycle")
+
+
+def _a_fault_is_said_while_the_run_goes_on(page: Chrome) -> None:
+    """Send a state with a fault of the device: the banner says cause and cure, in red, and goes with it."""
+    state = {"connection": "live", "pid": 1, "t_s": 1.1, "phase": "tripped", "fault": "It hung. Look at it."}
+    said = (
+        "panel.take(given[0]); const b = document.getElementById('banner');"
+        "return [b.textContent, b.className, b.hidden, b.getAttribute('role')]"
+    )
+    assert module(page, said, state) == ["Fault: It hung. Look at it.", "bad", False, "alert"]
+    assert module(page, said, {**state, "fault": "", "phase": "running"})[2] is True
 
 
 def _heap(page: Chrome) -> float:
@@ -279,13 +211,13 @@ def _heap_stays(page: Chrome, figure: Callable[[str], None]) -> None:
         "}"
         "await new Promise(requestAnimationFrame);"
     )
-    text = json.dumps(state)
-    _module(page, push, text, 0, _FRAMES_AT_ONCE)  # 30 s: more than the page keeps
+    line = json.dumps(state)
+    module(page, push, line, 0, _FRAMES_AT_ONCE)  # 30 s: more than the page keeps
     before = _heap(page)
     for first in range(_FRAMES_AT_ONCE, round(_TIME_S / _FRAME_S), _FRAMES_AT_ONCE):
-        _module(page, push, text, first, _FRAMES_AT_ONCE)
+        module(page, push, line, first, _FRAMES_AT_ONCE)
     after = _heap(page)
     figure(f"heap of the page, {_TIME_S:g} s of states: {before:.1f} -> {after:.1f} MB")
-    assert _module(page, "return trace.trace.t.at(-1)") > _TIME_S - 1.0
-    assert _module(page, "return trace.trace.t.length") <= 600
+    assert module(page, "return trace.trace.t.at(-1)") > _TIME_S - 1.0
+    assert module(page, "return trace.trace.t.length") <= 600
     assert after - before < _HEAP_MB * _TIME_S / 3600.0

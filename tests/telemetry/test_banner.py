@@ -73,6 +73,7 @@ def test_the_lamp(events: tuple[Event, ...], t: float, colour: tuple[int, int, i
 
 def test_the_last_events_stand_with_the_newest_first() -> None:
     made = banner(*(Event(float(k), "INFO", EventKind.OTHER, f"number {k}") for k in range(40)), WARNING)
+    made.take(Event(0.0, "INFO", EventKind.GRANT, "SCHED_FIFO: granted"), {}, {})
     lines = made.last.split("  \n")
     assert lines[0] == "▲ **2.000 s** voltage limited"
     assert lines[1] == "**39.000 s** number 39"

@@ -33,7 +33,7 @@ def test_only_what_counts_something_has_a_line_and_what_is_lost_has_one_from_the
     for name, label, counts in (
         ("lost", "lost", [0, 0, 1]),
         ("late", "late", [3, 3]),
-        ("crc_errors", "device: crc errors", [9]),
+        ("crc_errors", "crc errors", [9]),
     ):
         table = read_back(tmp_path / "run.rrd", f"link/{name}")
         assert table["SeriesLines:names"] == [[label]]

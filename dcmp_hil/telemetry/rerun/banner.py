@@ -17,6 +17,7 @@ GREY, GREEN, AMBER, RED = (90, 94, 100), (40, 150, 70), (235, 160, 20), (190, 30
 _WARNING_TIME_S = 10.0  # s for which a warning has the lamp
 _LAST_COUNT = 12  # events
 _DRIVEN = {"engaging", "running"}
+_OF_THE_START = {EventKind.HOST, EventKind.GRANT}  # what is as wanted there is in the log alone
 _LEVELS = {"WARN": "▲ ", "ERROR": "■ "}
 
 
@@ -58,7 +59,7 @@ class Banner:
             self._end = event.text
         if is_trip(event):
             self._take_trip(event)
-        if isinstance(event.data, PhaseData):
+        if isinstance(event.data, PhaseData) or (event.kind in _OF_THE_START and event.level not in _LEVELS):
             return
         self._last.insert(0, f"{_LEVELS.get(event.level, '')}**{event.t:.3f} s** {event.text}")
         del self._last[_LAST_COUNT:]

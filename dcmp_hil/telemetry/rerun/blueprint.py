@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 TIMELINE = "loop_time"
 _FUTURE_S = 1.5  # s on the right of the cursor, where no data are: the legend stands there
+_LINK_TIME_S = 60.0  # s of the link's counters, and as much room for the names of the lines
 _LEFT_SHARE = 17  # % of the width: what is left is 75 pixels a second on a screen of 1366
 _BACKGROUND_RGB = (15, 17, 20)
 _TRIPPED_RGB = (42, 6, 8)
@@ -51,7 +52,7 @@ def dashboard(rig: RigView, *, tripped: bool = False) -> rrb.Blueprint:
         _banner(),
         rrb.Horizontal(happens, rrb.Vertical(*wrong, timing)),
         states,
-        row_shares=[15, 70, 15] if tripped else [8, 77, 15],
+        row_shares=[16, 69, 15] if tripped else [8, 77, 15],
     )
     return opened(rrb.Horizontal(left, right, column_shares=[_LEFT_SHARE, 100 - _LEFT_SHARE]))
 
@@ -88,32 +89,34 @@ def plot(path: str, *, name: str = "", legend: bool = True) -> rrb.TimeSeriesVie
     )
 
 
-def _scrolling(path: str, name: str, *, tripped: bool) -> rrb.TimeSeriesView:
+def _scrolling(
+    path: str, name: str, *, tripped: bool, past: float = WINDOW_S, future: float = _FUTURE_S
+) -> rrb.TimeSeriesView:
     """Return the view of a plot that scrolls with the cursor, its legend in the empty future."""
     background = rrb.archetypes.PlotBackground(color=_TRIPPED_RGB, show_grid=True) if tripped else None
     return rrb.TimeSeriesView(
         origin=path,
         name=name,
-        axis_x=_axis(),
+        axis_x=_axis(past, future),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=True),
         background=background,
-        time_ranges=[_last()],
+        time_ranges=[_last(past)],
     )
 
 
-def _axis() -> rrb.archetypes.TimeAxis:
+def _axis(past: float = WINDOW_S, future: float = _FUTURE_S) -> rrb.archetypes.TimeAxis:
     return rrb.archetypes.TimeAxis(
         view_range=rr.TimeRange(
-            start=rr.TimeRangeBoundary.cursor_relative(seconds=-WINDOW_S),
-            end=rr.TimeRangeBoundary.cursor_relative(seconds=_FUTURE_S),
+            start=rr.TimeRangeBoundary.cursor_relative(seconds=-past),
+            end=rr.TimeRangeBoundary.cursor_relative(seconds=future),
         )
     )
 
 
-def _last() -> rr.VisibleTimeRange:
+def _last(past: float) -> rr.VisibleTimeRange:
     return rr.VisibleTimeRange(
         TIMELINE,
-        start=rr.TimeRangeBoundary.cursor_relative(seconds=-WINDOW_S),
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-past),
         end=rr.TimeRangeBoundary.cursor_relative(),
     )
 
@@ -156,7 +159,7 @@ def _portrait() -> rrb.Spatial2DView:
 
 
 def _link() -> rrb.TimeSeriesView:
-    return plot(LINK, name="Link: lost, damaged")
+    return _scrolling(LINK, "Link, last minute", tripped=False, past=_LINK_TIME_S, future=_LINK_TIME_S)
 
 
 def _parameters() -> rrb.Tabs:

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 LINK = "link"
 _ALWAYS_DRAWN = {"lost"}  # so that a link without a fault has a line at 0
-_LABELS = {
-    **{name: name for name in HOST_COUNTERS},
-    **{name: f"device: {name}".replace("_", " ") for name in DEVICE_COUNTERS},
-}
+_COUNTERS = (*HOST_COUNTERS, *DEVICE_COUNTERS)
+_COLOURS = (
+    *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79), (237, 201, 72)),
+    *((176, 122, 161), (255, 157, 167), (156, 117, 95), (186, 176, 172), (120, 200, 255), (200, 255, 120)),
+)
 _WIDTH_POINTS = 1.6
 
 
@@ -31,10 +32,16 @@ class LinkColumns:
 
     def of_counters(self, t: float, counters: Mapping[str, int]) -> Iterator[Rows]:
         """Yield the rows for the counters at `t`, s; those that are unknown have none."""
-        for (name, label), count in zip(_LABELS.items(), in_order(counters), strict=True):
+        told = in_order(counters)
+        for name, count, colour in zip(_COUNTERS, told, _COLOURS, strict=True):
             if name not in self._drawn and (count > 0 or (name in _ALWAYS_DRAWN and count == 0)):
                 self._drawn.add(name)
-                look = rr.SeriesLines(names=[label], widths=[_WIDTH_POINTS], interpolation_mode="StepAfter")
-                yield f"{LINK}/{name}", np.empty(0), look
+                yield f"{LINK}/{name}", np.empty(0), _look(name.replace("_", " "), colour)
             if name in self._drawn:
                 yield f"{LINK}/{name}", np.array([t]), rr.Scalars.columns(scalars=[count])
+
+
+def _look(label: str, colour: tuple[int, int, int]) -> rr.SeriesLines:
+    return rr.SeriesLines(
+        names=[label], colors=[colour], widths=[_WIDTH_POINTS], interpolation_mode="StepAfter"
+    )
