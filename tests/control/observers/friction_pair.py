@@ -118,11 +118,12 @@ class Case(NamedTuple):
 
 
 def random_pair(draw: Generator) -> Pair:
-    """Return a pair with a random encoder and period, that has stood still for a random while."""
+    """Return a pair with a random encoder and period, some samples and counts after its start."""
     pair = Pair(counts=float(draw.choice(_COUNTS)), period=float(draw.choice([2e-4, 1e-3, 4e-3])))
-    pair.start(round(draw.uniform(-1000.0, 1000.0)) * pair.reference.arm.q)
-    for _ in range(draw.integers(0, 3)):
-        pair.step(pair.reference.arm.period * draw.uniform(1.0, 10.0), pair.y, 0.0)
+    arm = pair.reference.arm
+    pair.start(round(draw.uniform(-1000.0, 1000.0)) * arm.q)
+    for _ in range(draw.integers(0, 4)):
+        pair.step(arm.period * draw.uniform(0.1, 10.0), pair.y + int(draw.choice([0, 0, 1, -1])) * arm.q, 0.0)
     return pair
 
 
