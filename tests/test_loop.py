@@ -84,7 +84,7 @@ class _Stages:
             backend=self.stage({"read": self.read, "write": lambda _: None}),
             outlier_filter=OutlierFilter(math.inf, 1e-3, 0.0),
             observer=self.stage({"update": lambda sample: Estimate(sample.position, 0.0, 0.0)}),
-            predictor=self.stage({"ahead": lambda _, __: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
+            predictor=self.stage({"ahead": lambda *_: Estimate(2.0, 0.0, 0.0), "sent": lambda _: None}),
             trajectory=self.stage(
                 {"at": lambda t: Reference(t, 0.0, 0.0), "hold": lambda _: None, "begin": lambda _, __: None}
             ),
@@ -124,7 +124,7 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     second = stages.calls[[name for name, _ in stages.calls].index("over") + 1 :]  # which has "begin"
     names = [name for name, _ in second]
     assert names == [
-        "read", "update", "engages", "begin", "ahead", "at", "limit_reference", "update", "safe_voltage",
+        "read", "update", "engages", "begin", "at", "limit_reference", "ahead", "update", "safe_voltage",
         "write", "sent", "record", "check", "over",
     ]  # fmt: skip
     given = dict(zip(range(len(second)), (arguments for _, arguments in second), strict=True))
@@ -132,9 +132,9 @@ def test_loop_passes_a_sample_through_its_stages_in_order() -> None:
     reference, ahead = Reference(sample.t + 0.001, 0.0, 0.0), Estimate(2.0, 0.0, 0.0)
     assert given[1] == (sample,)
     assert given[3] == (sample.t, 0.25)  # the trajectory starts at this sample, from the estimate
-    assert given[4] == (sample, estimate)
-    assert given[5] == (sample.t + 0.001,)  # when the command takes effect
-    assert given[6] == (sample, reference)
+    assert given[4] == (sample.t + 0.001,)  # when the command takes effect
+    assert given[5] == (sample, reference)
+    assert given[6] == (sample, estimate, reference)
     assert given[7] == (reference, ahead)  # the controller sees the state ahead, the monitors the present
     assert given[8] == (sample, estimate, 5.0)
     assert given[9] == given[10] == (6.0,)
