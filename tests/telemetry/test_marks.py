@@ -140,6 +140,17 @@ def test_a_mark_waits_for_its_axis_and_grows_with_it() -> None:
     assert list(marks.due("a", 7.1, 100.0)) == [("trip", 2.4, 100.0)]
 
 
+def test_a_trip_of_a_cycle_that_was_not_recorded_has_its_mark_all_the_same(tmp_path: Path) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "none")
+    for block in blocks(500):
+        sink.block(block)
+    sink.event(TRIP)
+    sink.close()
+    for plot in plots():
+        times: list[Any] = read_back(tmp_path / "run.rrd", f"{plot.path}/marks/trip")["loop_time"]
+        assert [round(time.total_seconds(), 3) for time in times] == [1.999] * 3
+
+
 def test_a_limit_that_acts_again_and_again_has_two_marks_a_second() -> None:
     marks = Marks()
     for k in range(1000):

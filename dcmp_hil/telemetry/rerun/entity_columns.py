@@ -88,6 +88,8 @@ class Frames:
             told = rr.TextLog.columns(text=[event.text], level=[event.level])
             calls = [(LOG, self._times(t), told), *self._changed(event)]
         self._banner.take(event, before, self._parameters.rows)
+        if self.tripped:
+            self._now = max(self._now, event.t)
         return [*calls, *self._words(event.t), *self._timed(self._plots.of_event(event))]
 
     def of_once(self, t: float) -> list[Call]:
@@ -100,7 +102,7 @@ class Frames:
 
     def of_end(self) -> list[Call]:
         """Return the calls behind the last block: lines that are sent seldom end there, a trip lasts 1 s."""
-        calls = list(self._seldom(np.array([self._now])))
+        calls = [*self._seldom(np.array([self._now])), *self._timed(self._plots.of_end())]
         if self.tripped and "phase" in self._shown:
             at = np.array([self._now + _EPILOGUE_TIME_S])
             calls.append(self._state("phase", at, [self._shown["phase"]]))

@@ -110,11 +110,17 @@ class PlotColumns:
             values[block["t"] >= self._tripped] = np.nan
         return values
 
-    def _due_marks(self, drawn: DrawnPlot) -> Iterator[Rows]:
+    def of_end(self) -> Iterator[Rows]:
+        """Yield the marks that still wait for data at their time, as of a cycle that was not recorded."""
+        for drawn in self._drawn:
+            yield from self._due_marks(drawn, all_of_them=True)
+
+    def _due_marks(self, drawn: DrawnPlot, *, all_of_them: bool = False) -> Iterator[Rows]:
         if not self._marks:
             return
         axis = drawn.rails.reach(self._now)
-        for kind, at, reach in self._marks.due(drawn.plot.path, self._now, axis):
+        now = np.inf if all_of_them else self._now
+        for kind, at, reach in self._marks.due(drawn.plot.path, now, axis):
             entity = f"{drawn.plot.path}/marks/{kind}"
             if entity not in self._styled:
                 self._styled.add(entity)
