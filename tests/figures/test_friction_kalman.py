@@ -112,6 +112,7 @@ ROWS = {
     "Stribeck 30 %": (Gate(track_ratio=1.0), Case((_FINE, "sim.stribeck_ratio=0.3"), phases=_EIGHT)),
     "Stribeck 60 %": (Gate(track_ratio=1.0), Case((_FINE, "sim.stribeck_ratio=0.6"), phases=_EIGHT)),
     "cogging": (Gate(track_ratio=1.05), Case((_FINE, "sim.cogging_rad_s2=0.3"), phases=_EIGHT)),
+    "soft friction": (Gate(track_ratio=1.9), Case((_FINE, "sim.bristle_mrad=2.0"))),
     "torque steps": (Gate(track_ratio=0.7, v_ratio=0.7, w_ratio=0.85), Case(_HAND, _STEPS)),
     "pushes": (Gate(track_ratio=0.7), Case(_HAND, _PUSHES)),
     "square torque": (Gate(track_ratio=1.05), Case(_HAND, _SQUARE)),
@@ -172,3 +173,16 @@ def test_two_sines(tmp_path: Path) -> None:
     np.savetxt(table, np.stack([t, position], axis=1), "%.9g", ",", header="time_s,position_rad", comments="")
     case = Case(("reference.kind=csv", f"reference.file={table}"))
     assert _reached("friction_kalman", case).track < 0.12
+
+
+@pytest.mark.parametrize(
+    ("kind", "bound"),
+    [
+        ("kalman", Reached(0.24, 0.009, 0.35, 160.0, 2.0)),
+        ("extended_state", Reached(0.31, 0.011, 0.41, 215.0, 2.0)),
+        ("derivative", Reached(0.27, 0.039, 2.1, 1900.0, 2.0)),
+    ],
+)
+def test_textbook_observers_reach_the_figures_of_the_page(kind: str, bound: Reached) -> None:
+    got = _reached(kind, Case())  # docs/observers.md, with 30 % of room
+    assert all(one < most for one, most in zip(got, bound, strict=True)), got
