@@ -82,6 +82,11 @@ class Feed:
             on = on and self.outlet.do(partial(_show_trip, self._rig))
         return on
 
+    @property
+    def tripped(self) -> bool:
+        """Whether the layout of a run that has tripped was sent."""
+        return self._frames.tripped
+
     def send_rest(self) -> bool:
         """Send the blocks that wait; see `block`."""
         if not self._waiting:

@@ -154,7 +154,8 @@ class RerunSink:
         for feed in self._feeds:
             try:
                 feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
-                if self._optimised and (file := feed.outlet.written()):
+                # Rerun writes the layouts of a file in an order of chance, and the last one is shown.
+                if self._optimised and not feed.tripped and (file := feed.outlet.written()):
                     left = max(0, end_ns - clock.now_ns()) * 1e-9
                     optimise(file, min(left, _OPTIMISE_TIMEOUT_S), self._needed)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
