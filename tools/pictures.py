@@ -46,7 +46,8 @@ CHANGED_AT_S, PUSHED_AT_S, SHOWN_AT_S = 11.0, 13.0, 12.0
 FIRST_PORT = 23_500  # of the ports tried for the recording's server
 _BLOCK_ROWS = 100
 _GREETING_TIME_S = 5.0  # s after the start, the viewer's first notice leaves the picture
-_SETTLE_TIME_S = 1.5  # s after new data, until all of it is drawn
+_SETTLE_TIME_S = 1.0  # s without a change
+_TRIALS_MAX = 30
 _CATCH_UP_TIMEOUT_S = 240.0  # s
 _WEB_SETTLE_TIME_S = 2.0  # s; a page is drawn a few times a second without a graphics card
 _SIGNS = {
@@ -161,7 +162,7 @@ def native(folder: Path, size: str) -> Iterator[tuple[str, Path, ViewerClient]]:
                 stage.sink.close()
             _catch_up(viewer, stage.now)
             picture = folder / f"native-{state}-{size}.png"
-            viewer.save_screenshot(str(picture.resolve()))
+            _draw(viewer, picture.resolve())
             yield state, picture, viewer
 
 
@@ -173,7 +174,18 @@ def _catch_up(viewer: ViewerClient, now: float) -> None:
         if shown and 1e-9 * max(shown) >= now - 1e-6:
             break
         pause(0.1)
-    pause(_SETTLE_TIME_S)
+
+
+def _draw(viewer: ViewerClient, picture: Path) -> None:
+    """Save what the viewer shows as soon as it has come to rest, or after half a minute."""
+    before = b""
+    for _ in range(_TRIALS_MAX):
+        pause(_SETTLE_TIME_S)
+        viewer.save_screenshot(str(picture))
+        now = picture.read_bytes()
+        if now == before:
+            return
+        before = now
 
 
 def web(folder: Path, size: str) -> Iterator[tuple[str, Path]]:
