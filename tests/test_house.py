@@ -12,6 +12,8 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -19,6 +21,11 @@ _ROOT = Path(__file__).parents[1]
 _RUN = {"__init__", "__main__", "api", "assembly", "fault_hooks", "loop", "result", "session"}
 _SHARED_WORDS = {"backend", "errors", "trip_request", "values"}
 _MODULE_LINES_MAX, _MODULE_LINES_MEDIAN, _FUNCTION_LINES_P95 = 300, 110, 25
+_TOP_LEVEL = {
+    *("dcmp_hil", "docs", "examples", "firmware", "sim_backend", "tests", "tools", "Makefile"),
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "SECURITY.md"),
+    *("pyproject.toml", "requirements.txt", "requirements-dev.txt"),
+}
 _HEAVY = {"can", "numpy", "pydantic", "rerun", "serial"}
 
 
@@ -138,3 +145,11 @@ def test_loop_is_imported_without_a_heavy_library() -> None:
     loaded = set(done.stdout.split())
     assert "dcmp_hil.loop" in loaded
     assert loaded & _HEAVY == set()
+
+
+def test_the_top_level_holds_nothing_by_accident() -> None:
+    told = subprocess.run(["git", "ls-files"], cwd=_ROOT, capture_output=True, text=True, check=False)
+    if told.returncode:
+        pytest.skip("this copy of the project is no clone: nothing tells what belongs to it")
+    top = {name.partition("/")[0] for name in told.stdout.splitlines()}
+    assert {name for name in top if not name.startswith(".")} <= _TOP_LEVEL
