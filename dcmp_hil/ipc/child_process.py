@@ -176,9 +176,9 @@ class ChildProcess:
 
     def hang_up(self) -> None:
         """Close the channel. From then on the child ends by itself, or by `end`."""
-        _hang_up(self.channel)
-        if self._ending:
+        if self._ending:  # first: a signal between the two leaves a child that sees the end of its channel
             self._ending.detach()
+        _hang_up(self.channel)
 
     def end(self, within: float) -> int:
         """Wait for it so many seconds, then kill it; return how it ended."""

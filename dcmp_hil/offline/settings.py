@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from dcmp_hil.common.number_range import NumberRange, number
 from dcmp_hil.config.rig import KINDS
-from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.rules import own_bounds, within_reason
+from dcmp_hil.config.sections import Custom, ModelSection
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.plugins.named_class import split_named
@@ -23,7 +24,6 @@ _CURRENT_FOLDER = Path()
 PERIOD_RANGE = NumberRange(1e-6, 10.0)
 """s, of a nominal sampling period."""
 _COUNTS_RANGE = NumberRange(4.0, 1e9)  # a revolution
-_F0_MAX_1_S, _KU_MAX_RAD_S2_V = 100.0, 1e4  # as of [model]
 IDEAL = "ideal"
 """`counts_per_rev` of an encoder without steps."""
 
@@ -127,16 +127,22 @@ class ReplaySettings:
         keys = {key: value for key, value in gains.items() if key in table.model_fields and value is not None}
         return cast("ObserverSection", table.model_validate({"kind": self.observer, **keys}))
 
+    def _bounds(self, key: str) -> NumberRange:
+        """Return the bounds that rig.toml has for a key of the observer; infinite where it has none."""
+        table = KINDS["observer"].get(self.kind)
+        return (
+            NumberRange(*within_reason(table, key)) if table and key in table.model_fields else NumberRange()
+        )
+
     def _ranges(self) -> list[tuple[str, float, str, NumberRange, str]]:
         """Of those that are set: option, value, unit, range, remedy."""
         counts = None if self.counts_per_rev == IDEAL else self.counts_per_rev
-        of_M = NumberRange(0.0, 1e9, low_excluded=self.observer == "paper")
         rows: list[tuple[str, float | str | None, str, NumberRange, str]] = [
             (
                 "--f0",
                 self.f0,
                 "1/s",
-                NumberRange(0.0, _F0_MAX_1_S),
+                own_bounds(ModelSection, "f0_1_s"),
                 "It is the viscous friction over the inertia.",
             ),
             ("--inertia", self.inertia, "kg m2", _above_zero(1e6), "Give J in kg m2."),
@@ -144,15 +150,15 @@ class ReplaySettings:
                 "--ku",
                 self.ku,
                 "(rad/s2)/V",
-                _above_zero(_KU_MAX_RAD_S2_V),
+                own_bounds(ModelSection, "ku_rad_s2_V"),
                 "It is ku/J, the acceleration of one volt.",
             ),
             ("--counts-per-rev", counts, "", _COUNTS_RANGE, "Give the counts after quadrature, or ideal."),
             ("--period", self.period, "s", PERIOD_RANGE, "Leave it out to take the median step."),
-            ("--L1", self.L1, "1/s", _above_zero(1e4), "The paper's is 4.9."),
-            ("--L2", self.L2, "1/s2", _above_zero(1e4), "The paper's is 5.51."),
-            ("--M", self.M, "rad/s3", of_M, "Leave it out for the default."),
-            ("--mu0", self.mu0, "rad/s", NumberRange(0.0, 1e6), "Leave it out to go by the rule."),
+            ("--L1", self.L1, "1/s", self._bounds("L1_1_s"), "The paper's is 4.9."),
+            ("--L2", self.L2, "1/s2", self._bounds("L2_1_s2"), "The paper's is 5.51."),
+            ("--M", self.M, "rad/s3", self._bounds("M_rad_s3"), "Leave it out for the default."),
+            ("--mu0", self.mu0, "rad/s", self._bounds("mu0_rad_s"), "Leave it out to go by the rule."),
             (
                 "--from",
                 self.start,

@@ -26,7 +26,7 @@ class UninterruptedWork:
     """
 
     def __init__(self, work: Callable[[], None]) -> None:
-        self._work = work
+        self._work: Callable[[], None] | None = work
         self._gate = _thread.allocate_lock()  # taken while the function runs
         self._done = _thread.allocate_lock()  # taken until it has run
         self._done.acquire()
@@ -63,9 +63,10 @@ class UninterruptedWork:
 
     def _run(self) -> None:
         with self._gate:
-            if not self._cancelled:
+            if not self._cancelled and self._work is not None:
                 try:
                     self._work()
                 except BaseException as error:  # noqa: BLE001 - raised by `do`
                     self._error = error
+            self._work = None  # what it holds is the caller's alone before the caller goes on
         self._done.release()

@@ -160,11 +160,18 @@ def test_one_of_each_is_found_wherever_it_belongs(tree: Path) -> None:
     assert {name: seen for name, seen in found.items() if not all(seen)} == {}
 
 
+_COUNTED_ELSEWHERE = {
+    "board": (1, 0, 0),  # tests/target/test_boards.py builds one that is a single file
+    "field of the protocol": (0, 1, 0),  # tests/tools/test_protocol_code.py adds one to the DBC alone
+}
+
+
 def test_the_page_says_how_many_places_are_edited_by_hand() -> None:
     page = (_ROOT / "CONTRIBUTING.md").read_text("utf-8")
     rows = re.findall(r"^\| ([a-z ]+) \| (\d+) \| (\d+) \| (\d+) \|$", page, re.MULTILINE)
     said = {name: tuple(map(int, numbers)) for name, *numbers in rows}
-    assert said == {
+    counted = {
         name: (len(addition.files), len(addition.places), len(addition.tests))
         for name, addition in ADDITIONS.items()
     }
+    assert said == counted | _COUNTED_ELSEWHERE
