@@ -16,6 +16,7 @@ from typer.main import get_command
 from dcmp_hil.cli import app
 from dcmp_hil.config import load_rig, shipped_rigs
 from dcmp_hil.config.explain import explain
+from dcmp_hil.config.rig import KINDS as TABLES
 from dcmp_hil.conformance.registry import CHECKS
 from dcmp_hil.live.tunables import settable
 from sim_backend.faults.fault_spec import KINDS, FaultSpec
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 SHELLS = ("bash", "zsh", "fish")
 COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
+_OBSERVERS = [kind for kind in TABLES["observer"] if kind != "custom"]
 TIMEOUT_S = 120.0
 ASK_BASH = """
 . "$0"
@@ -95,7 +97,7 @@ def ask(scripts: dict[str, Path], tmp_path: Path) -> Callable[[str], list[str]]:
         ("run --viewer=s", ["spawn", "serve"]),
         ("run --fast --duration ", []),
         ("run --set loop.", ["loop.rate_hz=", "loop.delay_samples="]),
-        ("run --set observer.kind=", ["super_twisting", "paper"]),
+        ("run --set observer.kind=", _OBSERVERS),
         ("run --set=observer.kind=p", ["paper"]),
         ("run --set observer.kind=paper --set timing.overrun=", ["hold", "skip", "stop"]),
         ("run --note stop --j", ["--json"]),
@@ -107,7 +109,7 @@ def ask(scripts: dict[str, Path], tmp_path: Path) -> Callable[[str], list[str]]:
         ("check ", [*shipped_rigs(), "own.toml", "folder"]),
         ("run --json d", ["data.csv"]),
         ("replay ", ["data.csv", "folder", "own.toml"]),
-        ("replay --observer ", ["super_twisting", "paper"]),
+        ("replay --observer ", _OBSERVERS),
         ("replay data.csv --compare model.k", ["model.ku_rad_s2_V="]),
         ("replay data.csv --compare supervisor", []),
         ("conform --link ", ["cobs", "slcan", "can"]),

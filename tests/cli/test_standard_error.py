@@ -68,7 +68,8 @@ def test_nothing_is_said_of_watchers_that_are_connected_at_the_end(
         _, err = run.communicate(timeout=TIMEOUT_S)
         for watcher in watchers:
             watcher.close()
-    assert json.loads(last) == {"ended": "Amplifier at 0 V.", "at_zero": True}
+    told = json.loads(last)
+    assert (told["ended"], told["at_zero"]) == ("Amplifier at 0 V.", True)
     assert run.returncode == 0
     assert err == ""
 

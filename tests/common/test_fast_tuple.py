@@ -33,5 +33,6 @@ def test_it_is_used_in_the_cycle_alone_with_the_gain_beside_the_line() -> None:
             assert text.count(" us less") == text.count(" make(") + text.count("(make("), file
     assert used == {
         *("loop.py", "control/predictor.py", "control/references/periodic.py"),
+        *("control/observers/friction_kalman/observer.py", "control/observers/friction_kalman/predictor.py"),
         *("control/observers/super_twisting.py", "device/backend.py", "wire/layouts.py"),
     }
