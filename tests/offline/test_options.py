@@ -173,7 +173,8 @@ def test_what_cannot_be_is_refused(options: tuple[str, ...], says: str, cli: Cli
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("--period", "10.000001"), ("--from", "-0.00000012345678"), ("--L1", "100000.00001")]
+    ("option", "value"),
+    [("--period", "10.000001"), ("--from", "-0.00000012345678"), ("--L1", "100000.00001")],
 )
 def test_a_number_that_is_refused_is_named_as_it_was_given(
     cli: Cli, recording: str, option: str, value: str
