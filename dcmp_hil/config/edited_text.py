@@ -1,4 +1,4 @@
-"""Edits of a rig file's text that keep its comments, order and layout."""
+"""Edits of a rig file's text that keep every other line as it is."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ _PAIR = re.compile(r"""(\s*([\w-]+)\s*=\s*)("(?:[^"\\]|\\.)*"|'[^']*'|[^\s#"']+)
 def edited_text(text: str, overrides: Sequence[str], place: str) -> str:
     """Return the text of a rig file after overrides.
 
-    A line is changed behind its `=`; its comment stays, in its column where the value leaves room. A new key
-    comes behind the last one of its table. The result is read again and compared with what the overrides
-    make of the file.
+    A line is changed behind its `=`; its comment stays, in its column where the value leaves room. A line
+    goes, with its comment, where the new kind of a table does not know its key. A new key comes behind the
+    last one of its table, and its line ends as the one before it. The result is read again and compared with
+    what the overrides make of the file.
 
     Parameters
     ----------
     text
-        A rig file, with any ends of lines.
+        A rig file, with any ends of lines, also mixed ones.
     overrides
         `key=value` in dotted form; of keys in tables.
     place
@@ -43,13 +44,13 @@ def edited_text(text: str, overrides: Sequence[str], place: str) -> str:
     before = parse(text, place)
     after = copy.deepcopy(before)
     apply_overrides(after, overrides)
-    newline = "\r\n" if "\r\n" in text else "\n"
-    lines = text.replace("\r\n", "\n").split("\n")
+    lines = text.split("\n")  # each with the "\r" of its own end
+    lines[-1] += _end_behind(lines, len(lines) - 1)  # it has none, and is not the last one if keys follow
     for table, section in after.items():
         if isinstance(section, dict):
             old = before.get(table, {})
             _edit(lines, table, old if isinstance(old, dict) else {}, section)
-    result = newline.join(lines)
+    result = "\n".join(lines).removesuffix("\r")
     if not _holds(result, after):
         raise ConfigError(
             f"{place}: its layout cannot be edited here. Write the values into it: {', '.join(overrides)}."
@@ -78,7 +79,8 @@ def _edit(lines: list[str], table: str, old: dict[str, Any], new: dict[str, Any]
         if at is not None:
             lines[at] = _with_value(lines[at], toml_value(value))
         else:
-            lines.insert(_end_of(lines, table), f"{key} = {toml_value(value)}")
+            at = _end_of(lines, table)
+            lines.insert(at, f"{key} = {toml_value(value)}{_end_behind(lines, at)}")
 
 
 def _lines_of(lines: list[str], table: str) -> range | None:
@@ -107,9 +109,14 @@ def _end_of(lines: list[str], table: str) -> int:
     if own is None:
         while lines and not lines[-1].strip():
             lines.pop()
-        lines += ["", f"[{table}]", ""]
+        lines += [f"{line}{_end_behind(lines, len(lines))}" for line in ("", f"[{table}]", "")]
         return len(lines) - 1
     return 1 + max(at for at in own if at == own.start or _PAIR.fullmatch(lines[at]))
+
+
+def _end_behind(lines: list[str], at: int) -> str:
+    """Return the carriage return at the end of the line before a place, if it has one."""
+    return "\r" if at and lines[at - 1].endswith("\r") else ""
 
 
 def _with_value(line: str, value: str) -> str:
@@ -118,5 +125,5 @@ def _with_value(line: str, value: str) -> str:
     assert found is not None  # noqa: S101 - `_line_of` found it so
     start, _, old, gap, comment = found.groups()
     if not comment:
-        return f"{start}{value}"
+        return f"{start}{value}" + ("\r" if line.endswith("\r") else "")
     return f"{start}{value.ljust(len(old) + len(gap) - 1)} {comment}"

@@ -77,6 +77,29 @@ def test_every_shipped_rig_is_edited_as_its_overrides_say(name: str, ends: str) 
     assert new.count("\r") == (new.count("\n") if ends == "\r\n" else 0)
 
 
+def test_every_line_keeps_its_own_end() -> None:
+    text = _TEXT.replace("kd_1_s=130\n", "kd_1_s=130\r\n")
+    assert text.count("\r") == 1
+    overrides = ["controller.kp_1_s2=5200", "controller.kd_1_s=140", "controller.friction_feedforward=true"]
+    new = edited_text(text, overrides, "ours.toml")
+    assert set(new.split("\n")) - set(text.split("\n")) == {
+        "kp_1_s2 = 5200          # 1/s2",
+        "kd_1_s=140\r",
+        "friction_feedforward = true\r",  # as the line before it
+    }
+
+
+@pytest.mark.parametrize("last", ["\r\n", ""])
+def test_a_last_line_without_an_end_stays_so(last: str) -> None:
+    text = f"[controller]\r\nkp_1_s2 = 4000{last}"
+    new = edited_text(text, ["controller.kp_1_s2=5200"], "ours.toml")
+    assert new == f"[controller]\r\nkp_1_s2 = 5200{last}"
+    new = edited_text(text, ["controller.kd_1_s=140"], "ours.toml")
+    assert new == f"[controller]\r\nkp_1_s2 = 4000\r\nkd_1_s = 140{last}"
+    new = edited_text(text, ["observer.mu0_rad_s=33"], "ours.toml")
+    assert new == "[controller]\r\nkp_1_s2 = 4000\r\n\r\n[observer]\r\nmu0_rad_s = 33\r\n"
+
+
 @pytest.mark.parametrize(
     "text",
     [
