@@ -18,14 +18,14 @@ from dcmp_hil.errors import DcmpError
 from dcmp_hil.ipc.child_process import parent_lives
 from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, MAILBOX_BYTES, STOP_REQUEST, Mailbox
 from dcmp_hil.ipc.ring import Ring, capacity_of
-from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
+from dcmp_hil.ipc.run_end import LIVES
 from dcmp_hil.ipc.shared_memory import mapped
 from dcmp_hil.live.connection_limits import REQUEST_INTERVAL_MIN_S, REQUEST_TIMEOUT_S, ConnectionPool, listen
 from dcmp_hil.live.envelopes import BUCKETS_PER_LINE_MAX, COLUMNS, Envelopes
 from dcmp_hil.live.run_sockets import peer_of, socket_of
 from dcmp_hil.live.run_watch import RunWatch
-from dcmp_hil.live.start_values import overrides_between, tunable_overrides
-from dcmp_hil.live.state import phase_name, state_of
+from dcmp_hil.live.start_values import kept_references, overrides_between, table_overrides, tunable_overrides
+from dcmp_hil.live.state import end_of, finite, state_of
 from dcmp_hil.live.stop_command import stop_run
 from dcmp_hil.live.tunable_ranges import tunable_descriptions
 from dcmp_hil.live.tunables import changed, doubts
@@ -162,7 +162,9 @@ class Server:
         return {
             "knobs": tunable_descriptions(self._rig),
             "back": overrides_between(self._rig, self._started_with),
+            "kept": kept_references(self._rig, self._started_with),
             "values": tunable_overrides(self._rig),
+            "tables": table_overrides(self._rig),
         }
 
     def look(self) -> bool:
@@ -208,7 +210,7 @@ class Server:
         try:
             rig, change = changed(self._rig, overrides)
             if (change.gains, change.tuning, change.reference) == (None, None, None):
-                return {"ok": True, "said": change.words, "t": self._ring.newest}
+                return {"ok": True, "said": change.words, "t": finite(self._ring.newest)}
             answer = await self._dispatch(self._mailbox.put(change))
         except DcmpError as error:
             return {"ok": False, "said": str(error)}
@@ -223,9 +225,9 @@ class Server:
         doubtful = doubts(self._rig, rig)
         self._rig = rig
         self._tunables = self._described()
-        self._marks.append((answer.t, change.words))
+        self._marks.append((finite(answer.t), change.words))
         said = [f"{change.words}, applied at {answer.t:.3f} s", *(f"warning: {one}" for one in doubtful)]
-        return {"ok": True, "said": "\n".join(said), "t": answer.t, "warnings": doubtful}
+        return {"ok": True, "said": "\n".join(said), "t": finite(answer.t), "warnings": doubtful}
 
     async def _dispatch(self, number: int) -> Answer | None:
         for _ in range(round(_CHANGE_TIMEOUT_S / _POLL_PERIOD_S)):
@@ -245,11 +247,9 @@ class Server:
                 break
             await asyncio.sleep(_POLL_PERIOD_S)
         self._over = True
-        said = self._mailbox.last_words or "it died; the device goes to 0 V by itself."
         self._take_in()
         self._envelopes.finish()
-        ended = {"ended": said, "at_zero": self._mailbox.end == AT_ZERO, "late": self._envelopes.late}
-        ended["last_phase"] = phase_name(self._mailbox.phase)
+        ended = {**end_of(self._mailbox), "late": self._envelopes.late}
         for writer, place in tuple(self._watchers.items()):
             last = {**ended, "columns": COLUMNS, "buckets": self._envelopes.history.newest(place)}
             with suppress(OSError):
@@ -257,7 +257,7 @@ class Server:
 
 
 async def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> None:
-    writer.write(json.dumps(message).encode() + b"\n")
+    writer.write(json.dumps(message, allow_nan=False).encode() + b"\n")
     await writer.drain()
 
 

@@ -152,7 +152,7 @@ class _Open:
 
     def bucket(self) -> Bucket:
         pairs = np.column_stack([self._low, self._high]).ravel().tolist()
-        return [round(0.5 * (self._first + self._last), 5), self.late, *_rounded(pairs)]
+        return [round(0.5 * self._first + 0.5 * self._last, 5), self.late, *_rounded(pairs)]
 
 
 def _drawn(block: Block) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.ipc.run_end import AT_ZERO, LIVES
 from dcmp_hil.safety.device_faults import meaning_of
 from dcmp_hil.safety.supervisor import Phase
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.ipc.mailbox import Mailbox
 
 CYCLE_AGE_MAX_S = 0.5
 """s, how old the newest cycle of a run that goes on may be."""
@@ -48,7 +50,17 @@ def state_of(row: Mapping[str, float], phase: int, rig: Rig, age: float = 0.0) -
         "lateness_us": 1e6 * row.get("lateness", math.nan),
         "fault": _fault(int(row.get("fault", 0.0))),
     }
-    return {key: _plain(value) for key, value in state.items()}
+    return {key: finite(value) for key, value in state.items()}
+
+
+def end_of(mailbox: Mailbox) -> dict[str, Any]:
+    """Return how a run ended, in words, whether 0 V was confirmed, and its last phase."""
+    said = mailbox.last_words if mailbox.end != LIVES else ""
+    return {
+        "ended": said or "it died; the device goes to 0 V by itself.",
+        "at_zero": mailbox.end == AT_ZERO,
+        "last_phase": phase_name(mailbox.phase),
+    }
 
 
 def phase_name(number: int) -> str:
@@ -62,7 +74,7 @@ def _disturbance(row: Mapping[str, float], rig: Rig) -> dict[str, float | None]:
     gravity = friction = rest = None
     if whole is not None:
         model, velocity = rig.model.values(), row["velocity_estimate"]
-        gravity = -model.gravity * math.sin(row["position_estimate"])
+        gravity = -model.gravity * _sine(row["position_estimate"])
         friction = -math.copysign(model.f1, velocity) if velocity else 0.0
         rest = whole - gravity - friction
     return {
@@ -71,6 +83,11 @@ def _disturbance(row: Mapping[str, float], rig: Rig) -> dict[str, float | None]:
         "friction_rad_s2": friction,
         "rest_rad_s2": rest,
     }
+
+
+def _sine(angle: float) -> float:
+    """Return the sine, NaN of an infinite angle: the last row of a trip may hold one."""
+    return math.sin(angle) if math.isfinite(angle) else math.nan
 
 
 def _error_mrad(row: Mapping[str, float]) -> float | None:
@@ -87,5 +104,6 @@ def _fault(code: int) -> str:
     return f"{meaning.sentence}. {meaning.remedy}"
 
 
-def _plain(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return a value for JSON, which has no infinity and no NaN: None in their place."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.config.rules import own_bounds, within_reason
 from dcmp_hil.config.units import in_words, split_unit
+from dcmp_hil.live.state import finite
 from dcmp_hil.live.tunables import allowed, choices, settable, value_of
 
 if TYPE_CHECKING:
@@ -19,6 +21,10 @@ _SLIDER_RANGES = {  # from, to; both above 0: by decades. A key without a row: s
     "L1_1_s": (0.5, 50.0),
     "L2_1_s2": (0.5, 500.0),
     "M_rad_s3": (1.0, 2000.0),
+    "bandwidth_rad_s": (5.0, 200.0),
+    "w_noise": (0.1, 1000.0),
+    "d_noise": (0.001, 10.0),
+    "edge_counts": (0.02, 1.0),
     "amplitude_rad": (0.0, 3.0),
     "rate_rad_s": (0.05, 10.0),
     "from_hz": (0.0, 2.0),
@@ -37,7 +43,7 @@ _MU0_SLIDER_MIN_RAD_S = 5.0  # rad/s, of the slider for mu0
 
 
 def tunable_descriptions(rig: Rig) -> list[dict[str, Any]]:
-    """Return what JSON can hold, in the order in which it is best shown."""
+    """Return what JSON can hold, in the order in which it is best shown; a bound that is none is None."""
     return [_choice(rig, key) if key.endswith(".kind") else _number(rig, key) for key in settable(rig)]
 
 
@@ -63,8 +69,8 @@ def _number(rig: Rig, key: str) -> dict[str, Any]:
         "value": value,
         "unit": in_words(split_unit(name)[1]),
         "meaning": (field.description or "").replace("\n", " "),
-        "low": low,
-        "high": high,
+        "low": finite(low),
+        "high": finite(high),
         "slider": [min(start, value) if value > 0.0 or start <= 0.0 else start, max(end, value)],
         "decades": start > 0.0 and math.isfinite(end),
     }
@@ -84,7 +90,7 @@ def slider_range(section: type[Section], name: str, value: float) -> tuple[float
     stem, unit = split_unit(name)
     if unit == "rad" and not split_unit(stem)[1] and not math.isfinite(own.low):  # and not V/rad
         return _ANGLE_RANGE_RAD
-    far = _USUAL_RATIO * abs(value) or 1.0
+    far = min(_USUAL_RATIO * abs(value), sys.float_info.max) or 1.0
     if own.low < 0.0:
         return -far, far
     return (value / _USUAL_RATIO if own.low_excluded else own.low), far

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.common.atomic_file import place_beside, whole_file
-from dcmp_hil.config import change_rig, load_rig
+from dcmp_hil.config import load_rig
 from dcmp_hil.config.edited_text import edited_text
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.start_values import overrides_between
+from dcmp_hil.live.start_values import overrides_for_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 _BOM = "\ufeff"
 _LINES_AROUND = 3  # of the file, shown around a change
@@ -38,7 +38,9 @@ class RigFiles:
     def __init__(self) -> None:
         self._proposals: dict[str, Proposal] = {}
 
-    def propose(self, source: str, values: Sequence[str]) -> dict[str, str]:
+    def propose(
+        self, source: str, values: Sequence[str], tables: Mapping[str, Sequence[str]] | None = None
+    ) -> dict[str, str]:
         """Return what would put values into the file of a rig.
 
         Parameters
@@ -47,6 +49,8 @@ class RigFiles:
             The rig's file, or the name of a shipped rig.
         values
             Tunable keys of the run, as overrides.
+        tables
+            By table all that the run's rig states of it, for a table that has another kind in the file.
 
         Returns
         -------
@@ -60,7 +64,7 @@ class RigFiles:
             If the file cannot be read, edited or written, or the values break a rule of it.
         """
         there = load_rig(source)
-        overrides = overrides_between(there, change_rig(there, values))
+        overrides = overrides_for_file(there, values, tables or {})
         if not overrides:
             return {}
         if not _is_file(source):

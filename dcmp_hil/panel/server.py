@@ -142,7 +142,7 @@ class Panel:
             while not self._ending.is_set():
                 place, buckets = self._watcher.history.after(place)
                 state = {**self._watcher.state, "buckets": buckets, "server_ms": _now_ms()}
-                await answer.write(f"data: {json.dumps(state)}\n\n".encode())
+                await answer.write(f"data: {json.dumps(state, allow_nan=False)}\n\n".encode())
                 if len(buckets) < BUCKETS_PER_LINE_MAX:
                     await asyncio.sleep(_STATE_PERIOD_S)
         except ConnectionError:  # the page was closed
@@ -168,7 +168,7 @@ class Panel:
         if not source or values is None:
             return _said(ok=False, said="There is no run whose rig has a name or a file.")
         try:
-            found = await asyncio.to_thread(self._rig_files.propose, source, values)
+            found = await asyncio.to_thread(self._rig_files.propose, source, values, state.get("tables"))
         except ConfigError as error:
             return _said(ok=False, said=str(error))
         return web.json_response({"ok": True, "said": "", "source": source, **found})

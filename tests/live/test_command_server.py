@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from dcmp_hil.config.rig import KINDS
 from dcmp_hil.ipc.mailbox import APPLIED, LOWERING, MAILBOX_BYTES, Answer, Mailbox
 from dcmp_hil.ipc.ring import Ring, size_of
 from dcmp_hil.ipc.run_end import AT_ZERO, FORCED, LIVES, NOT_ARMED, UNCONFIRMED
 from dcmp_hil.ipc.shared_memory import mapped, reserve
 from dcmp_hil.live import command_server
 from dcmp_hil.live.envelopes import Envelopes
-from dcmp_hil.values import Truth
+from dcmp_hil.values import Estimate, Truth
 from tests.helpers import bench, cycle
 
 if TYPE_CHECKING:
@@ -28,11 +30,11 @@ _RING_ROWS = 16
 class _Rig:
     """What a run would share with its command process, and a loop that answers as it is told to."""
 
-    def __init__(self) -> None:
+    def __init__(self, *overrides: str) -> None:
         files = [reserve(self, "mailbox"), reserve(self, "ring")]
         self.mailbox = Mailbox(mapped(files[0], MAILBOX_BYTES))
         self.ring = Ring(_RING_ROWS, mapped(files[1], size_of(_RING_ROWS)))
-        setup = command_server.CommandSetup(bench(), files[0], files[1])
+        setup = command_server.CommandSetup(bench(*overrides), files[0], files[1])
         self.server = command_server.Server(setup, Mailbox(mapped(files[0], MAILBOX_BYTES)), os.getpid())
         self.answer: int | None = APPLIED
 
@@ -49,7 +51,7 @@ class _Rig:
                     reply = b""
                     with suppress(ConnectionError):
                         reply = await asyncio.wait_for(reader.readline(), 5.0)
-                    answers.append(json.loads(reply) if reply else None)
+                    answers.append(_strict(reply) if reply else None)
             finally:
                 loop.cancel()
                 writer.close()
@@ -60,6 +62,11 @@ class _Rig:
             if self.answer is not None and self.mailbox.answer(self.mailbox.words[0]) is None:
                 self.mailbox.reply(self.mailbox.words[0], Answer(self.answer, 3.25))
             await asyncio.sleep(0.001)
+
+
+def _strict(line: bytes) -> Any:
+    """Read a line as a browser does, which knows neither Infinity nor NaN."""
+    return json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} in {line!r}"))
 
 
 @pytest.fixture
@@ -155,7 +162,7 @@ async def _last_line(rig: _Rig, place: Path) -> dict[str, Any]:
             while line := await asyncio.wait_for(reader.readline(), 0.5):
                 lines.append(line)
         writer.close()
-        last: dict[str, Any] = json.loads(lines[-1])
+        last: dict[str, Any] = _strict(lines[-1])
         return last
 
 
@@ -171,6 +178,33 @@ def test_watchers_get_what_was_before_them_and_the_last_cycle(rig: _Rig, tmp_pat
     assert lines[-1]["last_phase"] == "running"
 
 
+@pytest.mark.parametrize("estimate", [math.inf, -math.inf, math.nan])
+def test_watchers_get_the_last_words_of_a_run_whose_estimate_is_no_number(
+    rig: _Rig, tmp_path: Path, estimate: float
+) -> None:
+    row = cycle(0.1)._replace(estimate=Estimate(estimate, estimate, estimate))
+    rig.ring.push(row, Truth(0.0, 0.0, 0.0))
+    rig.server.look()
+    first, *_, last = asyncio.run(_watched(rig, tmp_path / "s"))
+    names = ("velocity_rad_s", "disturbance_rad_s2", "gravity_rad_s2", "rest_rad_s2")
+    assert [first[name] for name in names] == [None] * 4
+    assert (first["t_s"], last["ended"]) == (0.1, "it died; the device goes to 0 V by itself.")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS["observer"] if kind != "custom"])
+def test_state_of_every_observer_is_json_for_a_browser(tmp_path: Path, kind: str) -> None:
+    rig = _Rig(f"observer.kind={kind}")
+    (state,) = asyncio.run(rig.ask(tmp_path / "s", {"do": "status"}))
+    assert f'observer.kind="{kind}"' in state["values"]
+    for knob in state["knobs"]:
+        if "slider" in knob:
+            start, end = knob["slider"]
+            low, high = knob["low"], knob["high"]
+            assert low is None or low <= start, knob
+            assert start <= knob["value"] <= end, knob
+            assert high is None or end <= high, knob
+
+
 async def _watched(rig: _Rig, place: Path) -> list[dict[str, Any]]:
     """Watch from now to the end; one more cycle comes in between."""
     async with await asyncio.start_unix_server(rig.server.serve, place):
@@ -181,9 +215,10 @@ async def _watched(rig: _Rig, place: Path) -> list[dict[str, Any]]:
         rig.ring.push(cycle(0.13, position=99.0), Truth(0.0, 0.0, 0.0))
         await rig.server.say_goodbye()
         while b'"ended"' not in lines[-1]:
+            assert lines[-1], "the command process left its watcher"
             lines.append(await asyncio.wait_for(reader.readline(), 5.0))
         writer.close()
-        return [json.loads(line) for line in lines]
+        return [_strict(line) for line in lines]
 
 
 def test_the_state_names_changes_and_the_way_back(rig: _Rig, tmp_path: Path) -> None:
@@ -197,7 +232,23 @@ def test_the_state_names_changes_and_the_way_back(rig: _Rig, tmp_path: Path) -> 
     assert state["back"] == [f"{kp}=4000"]
     assert f"{kp}=5200" in state["values"]
     assert 'controller.kind="pd_compensated"' in state["values"]
-    assert (back["back"], len(back["marks"])) == ([], 2)
+    assert (back["back"], back["kept"], len(back["marks"])) == ([], [], 2)
+
+
+def test_the_state_names_what_no_way_leads_back_to(tmp_path: Path) -> None:
+    file = tmp_path / "reference.csv"
+    file.write_text("time_s,position_rad\n0,0\n1,0.5\n")
+    rig = _Rig("reference.kind=csv", f"reference.file={file}")
+    start, _, state = asyncio.run(
+        rig.ask(
+            tmp_path / "s",
+            {"do": "status"},
+            _change("reference.kind=sine", "controller.kp_1_s2=5200"),
+            {"do": "status"},
+        )
+    )
+    assert (start["kept"], start["back"]) == ([], [])
+    assert (state["kept"], state["back"]) == (['reference.kind="csv"'], ["controller.kp_1_s2=4000"])
 
 
 def test_a_picture_that_fails_ends_no_command_process(rig: _Rig, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Annotated
 
 import pytest
@@ -137,6 +138,10 @@ def test_slider_of_a_key_without_a_row_follows_its_bounds_and_its_value(
     name: str, expected: tuple[float, float]
 ) -> None:
     assert slider_range(_WithoutRows, name, getattr(_WithoutRows(), name)) == pytest.approx(expected)
+
+
+def test_slider_of_the_largest_number_ends_at_a_number() -> None:
+    assert slider_range(_WithoutRows, "gain_V_rad", 1e308) == (0.0, sys.float_info.max)
 
 
 def test_upper_bound_of_a_key_is_the_highest_that_it_may_have() -> None:

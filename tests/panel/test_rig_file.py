@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dcmp_hil.config import copy_rig, load_rig
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.live.start_values import overrides_between, tunable_overrides
+from dcmp_hil.live.start_values import overrides_between, table_overrides, tunable_overrides
 from dcmp_hil.live.tunables import changed, settable, value_of
 from dcmp_hil.panel.rig_file import RigFiles
 from tests.helpers import bench
@@ -77,6 +78,38 @@ def test_another_kind_of_reference_is_written_with_its_keys(file: Path) -> None:
     assert rig.reference.kind == "trapezoid"
     for key in settable(after):
         assert value_of(rig, key) == value_of(after, key)
+
+
+def test_what_a_rule_works_out_for_a_run_is_not_fixed_in_its_file(file: Path) -> None:
+    run = bench("loop.rate_hz=500")
+    mu0 = value_of(run, "observer.mu0_rad_s")
+    assert mu0 != value_of(bench(), "observer.mu0_rad_s")
+    assert RigFiles().propose(str(file), tunable_overrides(run), table_overrides(run)) == {}
+    run = changed(run, ["observer.mu0_rad_s=35"])[0]
+    proposed = RigFiles().propose(str(file), tunable_overrides(run), table_overrides(run))
+    assert [line for line in proposed["diff"].splitlines()[2:] if line[0] in "+-"] == ["+mu0_rad_s = 35"]
+    assert overrides_between(run, bench("loop.rate_hz=500")) == [f"observer.mu0_rad_s={mu0!r}"]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ["observer.kind=friction_kalman", "observer.f1_uncertainty=0.5", "observer.d_noise=0.2"],
+        ["observer.kind=paper", "observer.M_rad_s3=500.0", "observer.start=zero"],
+        ["observer.kind=kalman"],
+    ],
+)
+def test_a_kind_that_the_file_does_not_have_is_written_with_all_that_the_run_states(
+    file: Path, given: list[str]
+) -> None:
+    run = bench(*given)
+    files = RigFiles()
+    files.accept(files.propose(str(file), tunable_overrides(run), table_overrides(run))["proposal"])
+    assert load_rig(file).observer == run.observer
+    assert load_rig(file).controller == run.controller
+    command = files.propose("bench-1khz", tunable_overrides(run), table_overrides(run))["command"]
+    overrides = shlex.split(command)[4::2]
+    assert bench(*overrides).observer == run.observer
 
 
 def test_a_shipped_rig_has_a_command_instead(file: Path) -> None:
