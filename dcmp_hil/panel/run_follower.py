@@ -9,11 +9,14 @@ from typing import Any
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.envelopes import BucketHistory
-from dcmp_hil.live.run_sockets import running, socket_of
+from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of
+from dcmp_hil.live.state import end_of
+from dcmp_hil.live.stop_command import is_alive
 
 _SEARCH_PERIOD_S = 0.5  # s between two looks for a run
 _SILENCE_MAX_S = 1.0  # s without a state after which the page says so
 _LINE_BYTES_MAX = 1 << 16  # bytes
+_UNKNOWN_END = {"ended": "it left without a word; how is not known here.", "at_zero": False}
 
 
 class Watcher:
@@ -43,33 +46,53 @@ class Watcher:
     async def watch(self) -> None:
         """Follow one run after the other, until cancelled."""
         while True:
-            pid = await asyncio.to_thread(self._find)
-            if pid is not None:
-                with suppress(OSError, ValueError):
-                    await self._follow(pid)
+            if self.run is None:
+                self.run = await asyncio.to_thread(self._find)
+            run = self.run
+            if run is not None and (await self._follow(run) or await self._follow_unseen(run)):
                 self.run = None
-                if self.state["connection"] != "ended":
-                    self.state |= {"connection": "ended", "ended": "its command process is gone."}
             await asyncio.sleep(_SEARCH_PERIOD_S)
 
     def _find(self) -> int | None:
-        try:
-            runs = running()
-        except ConfigError:
-            return None
+        runs = _listening()
         if self._wanted is not None:
             return self._wanted if self._wanted in runs else None
         return runs[-1] if runs else None
 
-    async def _follow(self, pid: int) -> None:
-        reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE_BYTES_MAX)
-        self.run = pid
-        try:
-            writer.write(b'{"do": "watch"}\n')
-            while line := await self._next_line(reader):
-                self._take(json.loads(line))
-        finally:
-            writer.close()
+    async def _follow(self, pid: int) -> bool:
+        """Follow a run by its command process; return whether that told of the run's end."""
+        told = False
+        with suppress(OSError, ValueError):
+            reader, writer = await asyncio.open_unix_connection(socket_of(pid), limit=_LINE_BYTES_MAX)
+            try:
+                writer.write(b'{"do": "watch"}\n')
+                while line := await self._next_line(reader):
+                    state = json.loads(line, parse_constant=lambda _: None)  # of an older version
+                    told = told or "ended" in state
+                    self._take(state)
+            finally:
+                writer.close()
+        return told
+
+    async def _follow_unseen(self, pid: int) -> bool:
+        """Follow a run without its command process, by the memory that they shared; return whether it ended.
+
+        A command process that listens is only slow, or about to be gone: it is asked again.
+        """
+        mailbox = await asyncio.to_thread(mailbox_of, pid)
+        known = self.state
+        if known.get("pid") != pid:
+            known = {"pid": pid}
+            self.history.clear()
+        while mailbox is not None and not mailbox.ended and is_alive(pid):
+            listens = pid in await asyncio.to_thread(_listening)
+            self.state = {**known, "connection": "silent" if listens else "unseen"}
+            if listens:
+                return False
+            await asyncio.sleep(_SEARCH_PERIOD_S)
+        end = _UNKNOWN_END if mailbox is None else end_of(mailbox)
+        self.state = {**known, **end, "connection": "ended"}
+        return True
 
     def _take(self, state: dict[str, Any]) -> None:
         """Keep a state; the last words of a run are added to the state before."""
@@ -89,3 +112,11 @@ class Watcher:
             if done:
                 return waiting.result()
             self.state = {**self.state, "connection": "silent"}
+
+
+def _listening() -> list[int]:
+    """Return the runs that listen, oldest first; none where their folder is not this user's own."""
+    try:
+        return running()
+    except ConfigError:
+        return []

@@ -139,7 +139,9 @@ def test_page_finds_the_next_run_and_escape_stops_it(tmp_path: Path) -> None:
             until(lambda: _text(page, "phase") == "run ended", "the page said that the run ended")
 
 
-def test_page_says_why_a_change_was_refused(tmp_path: Path) -> None:
+def test_page_says_why_a_change_was_refused_and_stops_a_run_whose_command_process_is_gone(
+    tmp_path: Path,
+) -> None:
     with (
         started(tmp_path, *_RUN) as run,
         started(tmp_path, "panel", "--port", str(free_port())) as panel,
@@ -151,6 +153,15 @@ def test_page_says_why_a_change_was_refused(tmp_path: Path) -> None:
         _type(page, "observer.mu0_rad_s", "5000")
         until(lambda: "too fast for loop.rate_hz" in _text(page, "log"), "the page said why")
         assert _text(page, "applied-observer.mu0_rad_s") == "40"
+        os.kill(command_process_of(run.pid), signal.SIGKILL)
+        until(lambda: _text(page, "phase") == "not seen", "the page said that it has lost the run")
+        assert "it may go on" in _text(page, "banner")
+        assert run.poll() is None
+        _by(page, "stop").click()
+        run.communicate(timeout=TIMEOUT_S)
+        assert run.returncode == 0
+        until(lambda: "Amplifier at 0 V." in _text(page, "banner"), "the page said how the run ended")
+        assert (_text(page, "phase"), _text(page, "voltage")) == ("run ended", "0.00")
 
 
 def _keep_picture(page: Chrome, name: str) -> None:

@@ -124,7 +124,7 @@ def test_values_that_break_a_rule_of_the_file_and_layouts_are_refused(file: Path
     text = file.read_text("utf-8")
     file.write_text(text.replace("rate_hz = 1000 ", "rate_hz = 100 "), "utf-8")
     with pytest.raises(ConfigError, match=r"stable|fast"):
-        RigFiles().propose(str(file), _values("controller.kp_1_s2=9000"))
+        RigFiles().propose(str(file), _values("observer.mu0_rad_s=45"))
     file.write_text("name = 'ours'\ncontroller = {kp_1_s2 = 4000.0}\n", "utf-8")
     with pytest.raises(ConfigError, match="cannot be edited here"):
         RigFiles().propose(str(file), _values(*_CHANGES))

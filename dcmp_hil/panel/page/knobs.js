@@ -10,6 +10,10 @@ let shape = "";
 const round = (value) => Number(value.toPrecision(4));
 const unit = (text) => text.replace(/2\b/g, "²").replace(/3\b/g, "³");
 const shown = (value) => (typeof value === "number" ? String(Number(value.toPrecision(6))) : value);
+const bounds = ({ low, high, unit: name }) => {
+  const ends = [low === null ? "" : `from ${shown(low)}`, high === null ? "" : `to ${shown(high)}`].filter(Boolean).join(" ");
+  return ends ? `Allowed: ${ends} ${unit(name)}`.trimEnd() : "Any number is allowed";
+};
 const toSlider = (knob, value) => (knob.decades ? Math.log10(value) : value);
 const fromSlider = (knob, value) => (knob.decades ? 10 ** value : value);
 
@@ -49,7 +53,7 @@ class Slider extends Row {
     const range = `${shown(round(knob.slider[0]))} … ${shown(round(knob.slider[1]))} ${unit(knob.unit)}`;
     this.element = document.createElement("div");
     this.element.className = "knob";
-    this.element.title = `${knob.key}: ${knob.meaning} Allowed: ${shown(knob.low)} to ${shown(knob.high)} ${unit(knob.unit)}.`;
+    this.element.title = `${knob.key}: ${knob.meaning} ${bounds(knob)}.`;
     this.element.innerHTML = '<label><b></b><span></span></label><output class="applied"></output><input type="range"><input type="number" step="any">';
     const [label, applied, slider, number] = this.element.children;
     [label.children[0].textContent, label.children[1].textContent] = [name, range];
@@ -60,7 +64,7 @@ class Slider extends Row {
     for (const input of [slider, number]) input.setAttribute("aria-describedby", applied.id);
     [slider.min, slider.max] = knob.slider.map((value) => toSlider(knob, value));
     slider.step = (slider.max - slider.min) / 400;
-    [number.min, number.max] = [knob.low, knob.high];
+    [number.min, number.max] = [knob.low ?? "", knob.high ?? ""]; // null: no bound
     slider.addEventListener("input", () => this.want(round(fromSlider(knob, Number(slider.value)))));
     number.addEventListener("change", () => {
       if (number.value !== "") this.want(Number(number.value));

@@ -12,7 +12,7 @@ function short(words) {
 
 export function setMarks(changes, end) {
   marks = changes.map(([t, words]) => [t, short(words), CHANGE]);
-  if (end) marks.push([end.t, end.bad ? "trip" : "end", end.bad ? "#f05050" : "#8b98a8"]);
+  if (end) marks.push([end.t, end.trip ? "trip" : "end", end.bad ? "#f05050" : "#8b98a8"]);
 }
 
 export const marksIn = (from, to) => marks.filter(([t]) => t >= from && t <= to);

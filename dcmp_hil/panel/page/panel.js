@@ -3,10 +3,10 @@
 import { by, log } from "./asking.js";
 import { drawKnobs } from "./knobs.js";
 import { setMarks } from "./marks.js";
-import { drawPhase, endedBadly } from "./phase.js";
+import { drawPhase, endedBadly, isOld } from "./phase.js";
 import { describePlots, drawPlots, setLimit } from "./plots.js";
 import { drawDeeds } from "./rig_file.js";
-import { setClock } from "./stop.js";
+import { drawStop, setClock } from "./stop.js";
 import { drawLate, drawTiles } from "./tiles.js";
 import { add, clear, trace } from "./trace.js";
 
@@ -43,26 +43,36 @@ function askForPicture() {
 
 // The newest state of the run; of one that does not answer, the words on it.
 export function take(now) {
+  guarded("STOP", () => drawStop(now)); // first: what fails after it leaves STOP as it must be
   if (typeof now.server_ms === "number") setClock(now.server_ms);
-  if (now.pid && now.pid !== state.pid) clear();
-  state = now.connection === "lost" ? { ...state, connection: "lost" } : now;
-  const live = state.connection === "live" && typeof state.t_s === "number";
+  if (now.pid && now.pid !== state.pid) guarded("trace", clear);
+  state = ["lost", "unread"].includes(now.connection) ? { ...state, ...now } : now;
+  const current = state.connection === "live" && typeof state.t_s === "number" && !isOld(state);
   guarded("phase", () => drawPhase(state));
-  guarded("tiles", () => drawTiles(live ? state : null, state.at_zero));
-  guarded("late", () => drawLate(state));
+  guarded("tiles", () => drawTiles(current ? state : null, state.at_zero));
+  guarded("late", () => drawLate(state, current));
   guarded("knobs", () => drawKnobs(state.knobs ?? [], state.connection === "live"));
   guarded("deeds", () => drawDeeds(state));
   guarded("trace", () => {
     add(state.columns ?? [], now.buckets ?? []);
     setLimit(state.voltage_limit_V);
-    const end = state.connection === "ended" && trace.t.length ? { t: trace.t.at(-1), bad: endedBadly(state) } : null;
+    const end = state.connection === "ended" && trace.t.length ? { t: trace.t.at(-1), trip: state.last_phase === "tripped", bad: endedBadly(state) } : null;
     setMarks(state.marks ?? [], end);
   });
   askForPicture();
 }
 
-const source = new EventSource("events");
-source.addEventListener("message", (event) => take(JSON.parse(event.data)));
+// A state that cannot be read is one of a run that may be there.
+export function read(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return { connection: "unread" };
+  }
+}
+
+export const source = new EventSource("events");
+source.addEventListener("message", ({ data }) => take(read(data)));
 source.addEventListener("error", () => take({ connection: "lost" }));
 new ResizeObserver(askForPicture).observe(by("charts"));
 

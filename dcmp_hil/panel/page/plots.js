@@ -157,7 +157,8 @@ export function describePlots() {
   for (const plot of plots) plot.describe();
 }
 
-const plotOf = (id) => plots.find(({ what }) => what.id === id).plot;
+// The uPlot of a plot, as it is drawn.
+export const plotOf = (id) => plots.find(({ what }) => what.id === id).plot;
 
 // How many labels the axes of a plot show.
 export const ticksOf = (id) => plotOf(id).axes.map(({ _values }) => (_values ?? []).filter((label) => label !== null && label !== "").length);

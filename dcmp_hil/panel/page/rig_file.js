@@ -4,20 +4,24 @@ import { by, log, post } from "./asking.js";
 import { change } from "./knobs.js";
 
 let back = []; // changes that lead back to the start
+let kept = []; // what does not lead back
 let proposal = null; // number of the diff that is shown
 
 export function drawDeeds(state) {
-  back = state.back ?? [];
+  [back, kept] = [state.back ?? [], state.kept ?? []];
   by("back").disabled = state.connection !== "live" || !back.length;
-  by("back").title = back.length ? `Sets ${back.join(", ")}` : "Nothing is different from the start of the run.";
+  const sets = back.length ? `Sets ${back.join(", ")}.` : `Nothing${kept.length ? " else" : ""} is different from the start of the run.`;
+  by("back").title = kept.length ? `${sets} ${notBack()}` : sets;
   by("write").disabled = !state.source || !state.values;
 }
+
+const notBack = () => `Not taken back: ${kept.join(", ")}, which is read before a run. Start another run with it.`;
 
 async function ask(path, body) {
   try {
     return await post(path, body);
   } catch {
-    return { ok: false, said: "The page's server does not answer." };
+    return { ok: false, unanswered: true, said: "The page's server does not answer." };
   }
 }
 
@@ -43,15 +47,18 @@ async function propose() {
   const reply = await ask("rig-diff");
   const name = reply.source ?? "rig.toml";
   if (!reply.ok) show("Not written", reply.said);
-  else if (reply.diff) show(`Write to ${name}?`, "Comments and layout stay. Nothing is written until you accept.", reply.diff, reply.proposal);
+  else if (reply.diff) show(`Write to ${name}?`, "All other lines stay as they are. Nothing is written until you accept.", reply.diff, reply.proposal);
   else if (reply.command) show("A shipped rig has no file", `Start it with these values, or copy it first: dcmp-hil rigs --copy ${name} my-rig.toml`, reply.command);
   else show("Nothing to write", `${name} has these values already.`);
 }
 
 async function accept() {
+  by("sheet-accept").disabled = true; // a diff is accepted once
   const reply = await ask("rig-write", { proposal });
+  by("sheet-accept").disabled = false;
+  if (reply.unanswered) reply.said += " Whether the file was written is not known: look at it.";
   log(reply);
-  show(reply.ok ? "Written" : "Not written", reply.said);
+  show(reply.ok ? "Written" : reply.unanswered ? "Not confirmed" : "Not written", reply.said);
 }
 
 function close() {
@@ -59,7 +66,10 @@ function close() {
   by("write").focus();
 }
 
-by("back").addEventListener("click", () => change(back));
+by("back").addEventListener("click", async () => {
+  await change(back);
+  if (kept.length) log({ ok: false, said: notBack() });
+});
 by("write").addEventListener("click", propose);
 by("sheet-accept").addEventListener("click", accept);
 by("sheet-close").addEventListener("click", close);

@@ -27,8 +27,10 @@ function doubtStop(sentence) {
 
 export const confirmed = () => doubtStop("");
 
-export function drawStop(live, silent, stopping) {
-  by("stop").disabled = !live && !silent;
+// STOP can be pressed unless it is known that there is no run.
+export function drawStop({ connection, stopping }) {
+  by("stop").disabled = connection === "none" || connection === "ended";
+  const live = connection === "live";
   if (live && !stopping && by("stop").textContent !== "STOPEsc") by("stop").innerHTML = "STOP<small>Esc</small>";
   if (!live) by("stop").textContent = "STOP";
 }

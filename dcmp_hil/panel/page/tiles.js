@@ -7,7 +7,7 @@ const say = (id, text) => {
   if (by(id).textContent !== text) by(id).textContent = text;
 };
 
-// `state` is null while there is no run that answers.
+// `state` is null where nothing of now is known: no run that answers, or no new cycle.
 export function drawTiles(state, atZero) {
   const now = state ?? {};
   say("position", number(now.position_rad, 3));
@@ -25,9 +25,9 @@ export function drawTiles(state, atZero) {
 }
 
 // Late cycles are counted: the number stays true after the end.
-export function drawLate(state) {
+export function drawLate(state, current) {
   say("late", typeof state.late === "number" ? String(state.late) : "–");
-  const lateness = typeof state.lateness_us === "number" && state.connection === "live" ? `${number(state.lateness_us, 0)} µs` : "–";
+  const lateness = typeof state.lateness_us === "number" && current ? `${number(state.lateness_us, 0)} µs` : "–";
   say("lateness", state.missed ? `${state.missed} cycles not seen here` : `newest ${lateness}`);
   by("late").classList.toggle("some", state.late > 0);
 }
