@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dcmp_hil.ipc.ring import FIELDS
+from dcmp_hil.telemetry.rerun.plots import plots
 from dcmp_hil.telemetry.rerun.rails import Rails, reach_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
-from tests.telemetry.runs import VIEW, feed, read_back, values
+from tests.telemetry.runs import VIEW, blocks, feed, read_back, values
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,3 +79,24 @@ def test_no_end_of_an_axis_is_short_of_what_is_drawn(tmp_path: Path) -> None:
         assert look["SeriesLines:names"] == [["", ""]]
         assert look["SeriesLines:colors"] == [[0, 0]]
         assert 4 <= len(rails) <= 8
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, 1.7e308])
+def test_a_value_that_is_infinite_is_a_gap_and_one_that_is_huge_has_an_axis(
+    tmp_path: Path, value: float
+) -> None:
+    made = blocks(300)
+    for field in set(FIELDS) - {"t", "began", "fault"}:
+        made[1].rows[50, FIELDS.index(field)] = value
+    sink = RerunSink(replace(VIEW, voltage_limit=None), tmp_path / "run.rrd", "none")
+    for block in made:
+        sink.block(block)
+    sink.close()
+    assert sink.warnings == []
+    for plot in plots():
+        lines = values(tmp_path / "run.rrd", f"{plot.path}/lines")
+        assert np.isfinite(np.delete(lines, 150, axis=0)).all()
+        assert not np.isinf(lines[150]).any()
+        ends = values(tmp_path / "run.rrd", f"{plot.path}/rails")
+        assert np.isfinite(ends).all()
+        assert math.isfinite(value) or ends.max() < 1e6

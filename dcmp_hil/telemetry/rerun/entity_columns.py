@@ -66,6 +66,7 @@ class Frames:
         """Whether an event has told of a trip."""
         return self._banner.tripped
 
+    @np.errstate(over="ignore", invalid="ignore")  # a class of the user's own may give any number
     def of_block(self, block: Block) -> list[Call]:
         """Return the calls for consecutive cycles, at least one and not more than about a second."""
         self._now = float(block["t"][-1])

@@ -70,7 +70,8 @@ class PlotColumns:
         self._marks.forget(float(every[0]))
         for drawn in self._drawn:
             t, values = peaks(every, self._values(drawn, block), self._bucket)
-            yield f"{drawn.plot.path}/lines", t, rr.Scalars.columns(scalars=single(values))
+            values = single(values)
+            yield f"{drawn.plot.path}/lines", t, rr.Scalars.columns(scalars=values)
             times, ends = drawn.rails.add(t, values)
             yield from _rails(drawn, times, ends)
             yield from self._due_marks(drawn)
@@ -100,6 +101,7 @@ class PlotColumns:
         return found
 
     def _values(self, drawn: DrawnPlot, block: Block) -> NDArray[np.float64]:
+        """Return what is drawn, shape (n, lines); what is no number, or infinite, is a gap."""
         values = np.stack([line.read(block) for line in drawn.lines], axis=1)
         if self._limit is not None:
             most = _CLIP_RATIO * self._limit
@@ -108,6 +110,7 @@ class PlotColumns:
                     values[:, column] = np.clip(values[:, column], -most, most)
         if drawn.plot.frozen:
             values[block["t"] >= self._tripped] = np.nan
+        values[~np.isfinite(values)] = np.nan  # no axis ends there
         return values
 
     def of_end(self) -> Iterator[Rows]:
