@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 
 from dcmp_hil.cli import run_sinks
 from dcmp_hil.telemetry.rerun import optimised_file
+from dcmp_hil.telemetry.rerun import sink as dashboard
 from dcmp_hil.telemetry.rerun.optimised_file import optimise
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.values import Event, EventKind, PhaseData
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 _PLENTY_S = 120.0  # s: these machines are shared
+_FIRST_PORT = 23_900  # of the ports tried for the recording's server
 _PLOT = "joint/position_rad/lines"
 
 
@@ -135,3 +137,15 @@ def test_a_run_that_tripped_is_left_as_it_was_written(
     feed(sink)
     with pytest.raises(Exception, match="no footer"):  # it warns, and a warning is an error here
         RrdReader(tmp_path / "run.rrd")
+
+
+def test_the_viewer_s_stream_is_closed_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sink = RerunSink(VIEW, tmp_path / "run.rrd", "serve", port=_FIRST_PORT, optimised=True)
+    ended: list[bool] = []
+
+    def noted(*_: object) -> None:
+        ended.extend(one.outlet._ended.is_set() for one in sink._feeds)  # noqa: SLF001
+
+    monkeypatch.setattr(dashboard, "optimise", noted)
+    feed(sink)
+    assert ended == [True, True]

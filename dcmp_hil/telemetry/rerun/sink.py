@@ -80,7 +80,8 @@ class RerunSink:
     history
         What late viewers get at most, such as ``64MiB``.
     optimised
-        Whether `close` rewrites the file with a footer and longer chunks, if that takes 5 s at most.
+        Whether `close` rewrites the file with a footer and longer chunks, if that takes 5 s at most, beside
+        what the disk takes to have it.
 
     Attributes
     ----------
@@ -150,16 +151,20 @@ class RerunSink:
         end_ns = clock.now_ns() + int(_CLOSE_TIMEOUT_S * 1e9)
         atexit.unregister(self.close)
         faults: list[str] = []
+        whole: list[Feed] = []
         self._tell(Feed.finish)
         for feed in self._feeds:
             try:
                 feed.outlet.close(max(0, end_ns - clock.now_ns()) * 1e-9)
-                # Rerun writes the layouts of a file in an order of chance, and the last one is shown.
-                if self._optimised and not feed.tripped and (file := feed.outlet.written()):
-                    left = max(0, end_ns - clock.now_ns()) * 1e-9
-                    optimise(file, min(left, _OPTIMISE_TIMEOUT_S), self._needed)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
                 faults.append(incomplete(feed.outlet, str(error)))
+            else:
+                whole.append(feed)
+        for feed in whole:  # no viewer waits for it
+            # Rerun writes the layouts of a file in an order of chance, and the last one is shown.
+            if self._optimised and not feed.tripped and (file := feed.outlet.written()):
+                left = max(0, end_ns - clock.now_ns()) * 1e-9
+                optimise(file, min(left, _OPTIMISE_TIMEOUT_S), self._needed)
         if faults:
             raise RuntimeError(faults[0])
 
