@@ -80,6 +80,15 @@ def test_the_last_events_stand_with_the_newest_first() -> None:
     assert len(lines) == 12
 
 
+def test_no_text_of_an_event_is_markup() -> None:
+    failed = Event(2.0, "WARN", EventKind.TELEMETRY, "a|b.csv: full.\n# *Free* some space.")
+    made = banner(phase("running"), failed)
+    assert made.last == r"▲ **2.000 s** a\|b.csv: full. # \*Free\* some space."
+    assert r"2.000 s: a\|b.csv: full. # \*Free\* some" in made.text
+    tripped = Event(3.0, "ERROR", EventKind.TRIP, "tripped (own): *x*. See\n[model].", CauseData("own"))
+    assert banner(tripped).text == "# TRIPPED: own, at 3.000 s\n\n**\\*x\\*.** See \\[model\\]."
+
+
 def test_what_is_sent_once_comes_again_with_banner_lamp_and_events() -> None:
     frames = Frames(VIEW)
     frames.of_event(phase("running"))

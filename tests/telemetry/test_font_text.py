@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcmp_hil.telemetry.rerun import viewer as window
-from dcmp_hil.telemetry.rerun.font_text import _MISSING, drawable, drawable_path
+from dcmp_hil.telemetry.rerun.font_text import _MISSING, drawable, drawable_path, markdown
 from dcmp_hil.telemetry.rerun.series import write_series
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.rerun.text_stream import _layout
@@ -81,6 +81,14 @@ def test_others_are_named_by_their_number() -> None:
     assert drawable("a 中文 \U0001f680!") == "a {U+4E2D U+6587} {U+1F680}!"
     assert drawable("e\u0301\r\n\x1b\udcff") == "é\n{U+001B U+DCFF}"
     assert drawable_path("params/observer/中文") == "params/observer/_4E2D_6587_"
+
+
+def test_markdown_shows_a_text_as_it_is_and_in_one_line() -> None:
+    assert markdown("kp_1_s2 4000 -> 4500, 8 % #1.") == "kp_1_s2 4000 -> 4500, 8 % #1."
+    assert markdown("a|b `c` *d* [e] <f> &g; ~h~ $i$ \\ _j_") == (
+        r"a\|b \`c\` \*d\* \[e\] \<f> \&g; \~h\~ \$i\$ \\ \_j\_"
+    )
+    assert markdown("No space left.\r\n\n  # 0 bytes\udcff") == "No space left. # 0 bytes{U+DCFF}"
 
 
 @given(st.text(st.characters()))

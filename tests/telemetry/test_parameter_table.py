@@ -9,7 +9,7 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.live.tunables import changed
-from dcmp_hil.telemetry.rerun.parameter_table import Parameters
+from dcmp_hil.telemetry.rerun.parameter_table import Parameters, page_of, table_of
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.values import ChangeData, Event, EventKind
@@ -84,3 +84,12 @@ def test_a_recording_explains_itself(tmp_path: Path) -> None:
     relative: Any = read_back(record, "params_over_start")
     steps = [row[place] for row in relative["Scalars:scalars"]]
     assert (periods_of(relative), steps) == ([0, 500, 999], [1.0, 1.25, 1.25])
+
+
+def test_no_value_ends_its_cell_or_begins_markup() -> None:
+    rows = {"reference.file": "a|b*.csv", "controller._own_": "<b>\n# x"}
+    assert page_of("ri|g", rows).splitlines() == [
+        *(r"| ri\|g | |", "|:--|:--|", "| **reference** |  |", r"| file | a\|b\*.csv |"),
+        *("| **controller** |  |", r"| \_own\_ | \<b> # x |"),
+    ]
+    assert table_of("versions", [("host", "a|b")]).splitlines()[-1] == r"| host | a\|b |"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dcmp_hil.telemetry.rerun.font_text import markdown
 from dcmp_hil.telemetry.rerun.marks import is_trip
 from dcmp_hil.values import CauseData, ChangeData, EventKind, PhaseData
 
@@ -61,7 +62,7 @@ class Banner:
             self._take_trip(event)
         if isinstance(event.data, PhaseData) or (event.kind in _OF_THE_START and event.level not in _LEVELS):
             return
-        self._last.insert(0, f"{_LEVELS.get(event.level, '')}**{event.t:.3f} s** {event.text}")
+        self._last.insert(0, f"{_LEVELS.get(event.level, '')}**{event.t:.3f} s** {markdown(event.text)}")
         del self._last[_LAST_COUNT:]
 
     def _take_trip(self, event: Event) -> None:
@@ -84,13 +85,15 @@ class Banner:
         """Return the banner in Markdown."""
         if self.tripped:
             cause, t = self._trip
-            head = f"# TRIPPED: {cause}, at {t:.3f} s" if cause else f"# ENDED BY A FAULT at {t:.3f} s"
+            head = (
+                f"# TRIPPED: {markdown(cause)}, at {t:.3f} s" if cause else f"# ENDED BY A FAULT at {t:.3f} s"
+            )
             return f"{head}\n\n{emphasised(self._text, cause)}".rstrip()
         parts = [
             f"**{self._phase.upper()}**",
-            self._change,
-            f"▲ {self._warning}" if self._warning else "",
-            f"**ended**: {self._end}" if self._end else "",
+            markdown(self._change),
+            f"▲ {markdown(self._warning)}" if self._warning else "",
+            f"**ended**: {markdown(self._end)}" if self._end else "",
         ]
         return " · ".join(part for part in parts if part)
 
@@ -104,7 +107,7 @@ def emphasised(text: str, cause: str) -> str:
     """Return the text of a trip with its first sentence in bold, which is a matter of type only."""
     plain = text.removeprefix(f"tripped ({cause}): ")
     first, stop, rest = plain.partition(". ")
-    return f"**{first}{stop.rstrip()}** {rest}".rstrip() if plain else ""
+    return f"**{markdown(first)}{stop.rstrip()}** {markdown(rest)}".rstrip() if plain else ""
 
 
 def _in_words(event: Event, data: ChangeData, before: Mapping[str, str], after: Mapping[str, str]) -> str:

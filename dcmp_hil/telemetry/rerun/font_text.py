@@ -20,11 +20,22 @@ _DRAWN = (
 )
 """Characters of both fonts of the viewer, Inter and JetBrains Mono, as a class of a regular expression."""
 _MISSING = re.compile(f"[^{_DRAWN}]+")
+_LINE_END = re.compile(r"\s*[\r\n]\s*")
+_MARKUP = re.compile(r"[\\`*\[\]<&|~$]|(?<!\w)_|_(?!\w)")
 
 
 def drawable(text: str) -> str:
     """Return `text` with each run of characters that a viewer cannot draw named: ``{U+4E2D U+6587}``."""
     return _MISSING.sub(lambda found: f"{{{_names(found[0], ' ', 'U+')}}}", _composed(text))
+
+
+def markdown(text: str) -> str:
+    """Return `text` as Markdown that shows it as it is, in one line, behind the beginning of a line.
+
+    A rig's file may be called ``a|b.csv``, which would end a cell of a table, and a sentence may have several
+    lines, of which one begins as a heading does.
+    """
+    return _MARKUP.sub(r"\\\g<0>", _LINE_END.sub(" ", drawable(text)))
 
 
 def drawable_path(path: str) -> str:

@@ -7,6 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from dcmp_hil.config.formatting import toml_value
+from dcmp_hil.telemetry.rerun.font_text import markdown
 from dcmp_hil.values import ChangeData
 
 if TYPE_CHECKING:
@@ -91,10 +92,16 @@ def page_of(head: str, rows: Mapping[str, str]) -> str:
     sections: dict[str, list[tuple[str, str]]] = {}
     for key, value in rows.items():
         section, _, name = key.rpartition(".")
-        sections.setdefault(section, [(f"**{section}**", "")]).append((name, value))
-    return table_of(head, chain.from_iterable(sections.values()))
+        title = (f"**{markdown(section)}**", "")
+        sections.setdefault(section, [title]).append((markdown(name), markdown(value)))
+    return _table(head, chain.from_iterable(sections.values()))
 
 
 def table_of(head: str, rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of names and values, in Markdown."""
-    return "\n".join([f"| {head} | |", "|:--|:--|", *(f"| {name} | {value} |" for name, value in rows)])
+    return _table(head, ((markdown(name), markdown(value)) for name, value in rows))
+
+
+def _table(head: str, cells: Iterable[tuple[str, str]]) -> str:
+    rows = (f"| {name} | {value} |" for name, value in cells)
+    return "\n".join([f"| {markdown(head)} | |", "|:--|:--|", *rows])
