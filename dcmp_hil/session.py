@@ -160,7 +160,7 @@ class Session:
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
             trip.cycles = tuple(recorder.recent)
-            end, why = end_after(seen, reached=reached, armed=armed), f"{trip} "
+            end, why = end_after(trip, reached=reached, armed=armed), f"{trip} "
             self._tell("ERROR", EventKind.TRIP, f"tripped ({trip.reason}): {trip}", CauseData(trip.reason))
             raise trip from seen.__cause__
         except DeadlineError as error:
@@ -180,7 +180,7 @@ class Session:
             recorder.link.finish(recorder.t)
             if not why:
                 self._tell_how_device_ended()
-            self._tell(end.level, EventKind.END, end.words)
+            self._tell(end.level, EventKind.END, end.words, end.forced)
             recorder.close()
             if self._apart:
                 self._figures = self._apart.figures

@@ -94,7 +94,7 @@ class EventKind(StrEnum):
     TRIP = "trip"
     DEADLINE = "deadline"
     DEVICE_END = "device_end"  # the device ended the run by a fault of its own
-    END = "end"  # where the amplifier is after the run
+    END = "end"  # where the amplifier is after the run, and what ended it by force
     OTHER = "other"  # read from a recording of another version
 
 
@@ -136,7 +136,14 @@ class CauseData(NamedTuple):
     cause: str  # a word that stays the same from release to release
 
 
-EventData = PhaseData | ProbeData | LimitData | LinkData | ChangeData | CauseData
+class EndData(NamedTuple):
+    """Data of an event of kind END where a run did not end as it was asked to; None where it did."""
+
+    cause: str  # the reason of a trip, "deadline", or the class of the error
+    words: str  # the error's own, for people
+
+
+EventData = PhaseData | ProbeData | LimitData | LinkData | ChangeData | CauseData | EndData
 
 DATA: Mapping[EventKind, type[EventData]] = {
     EventKind.PHASE: PhaseData,
@@ -147,8 +154,11 @@ DATA: Mapping[EventKind, type[EventData]] = {
     EventKind.CHANGE: ChangeData,
     EventKind.TRIP: CauseData,
     EventKind.DEADLINE: CauseData,
+    EventKind.END: EndData,
 }
 """What the data of each kind are; events of every other kind have none."""
+OPTIONAL_DATA = frozenset({EventKind.END})
+"""Kinds whose events may be without data."""
 
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]
 

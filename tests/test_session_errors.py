@@ -18,7 +18,7 @@ from dcmp_hil.errors import (
 )
 from dcmp_hil.ipc.run_end import NOT_ARMED, UNCONFIRMED
 from dcmp_hil.session import Session
-from dcmp_hil.values import Estimate, Reference, Sample
+from dcmp_hil.values import EndData, Estimate, Event, Reference, Sample
 from sim_backend.backend import SimBackend
 from tests.helpers import STEADY, HeldRun, T, bench, named
 from tests.live.here import Here
@@ -92,6 +92,16 @@ def test_amplifier_is_released_when_a_users_code_raises(where: str, error: type[
         "amplifier at 0 V" if confirmed else "0 V was not confirmed: the device goes there by itself"
     )
     assert end.t == pytest.approx(0.298, abs=2 * T)  # the time of the last period, not 0
+    _says_what_ended_it(end, caught.value)
+
+
+def _says_what_ended_it(end: Event, error: BaseException) -> None:
+    if isinstance(error, KeyboardInterrupt):  # a person's wish
+        assert end.data is None
+        return
+    assert isinstance(end.data, EndData)
+    assert end.data.cause == getattr(error, "reason", type(error).__name__)
+    assert "the user's own" in end.data.words
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -6,7 +6,8 @@ import os
 import struct
 from typing import Literal, NamedTuple
 
-from dcmp_hil.errors import BackendError, ConfigError, OpenError
+from dcmp_hil.errors import BackendError, ConfigError, DeadlineError, OpenError, TripError
+from dcmp_hil.values import EndData
 
 LIVES, AT_ZERO, UNCONFIRMED, FORCED, NOT_ARMED = range(5)
 """Not yet; 0 V confirmed; 0 V not confirmed; signals were sent, as it did not answer STOP; this run has not
@@ -16,6 +17,7 @@ RUN_CODES = (AT_ZERO, UNCONFIRMED, NOT_ARMED)
 RUN_END_WORD = 11
 """Place of the number in the memory, in words of 8 bytes."""
 _NUMBER = struct.Struct("q")
+_WORDS_CHARS_MAX = 1000  # characters
 
 
 def end_in(file: int) -> int:
@@ -25,11 +27,13 @@ def end_in(file: int) -> int:
 
 
 class RunEnd(NamedTuple):
-    """Knowledge of the amplifier at the end of a run: a code, and the level and words of an event."""
+    """Knowledge of the amplifier at the end of a run: a code, and the level, words and data of an event."""
 
     code: int
     level: Literal["INFO", "ERROR"]
     words: str
+    forced: EndData | None = None
+    """What ended the run; None where it ended as it was asked to."""
 
     @property
     def sentence(self) -> str:
@@ -44,7 +48,7 @@ _UNKNOWN = RunEnd(UNCONFIRMED, "ERROR", "0 V was not confirmed: the device goes 
 
 
 def end_after(error: BaseException, *, reached: bool, armed: bool) -> RunEnd:
-    """Return the knowledge of the amplifier after an error.
+    """Return the knowledge of the amplifier after an error, and what the error was.
 
     Parameters
     ----------
@@ -55,8 +59,21 @@ def end_after(error: BaseException, *, reached: bool, armed: bool) -> RunEnd:
     armed
         Whether it had armed it.
     """
+    end = ZERO
     if not reached or (not armed and isinstance(error, OpenError | ConfigError)):
-        return _NOT_OURS
-    if not armed or isinstance(error, BackendError) or getattr(error, "__notes__", None):
-        return _UNKNOWN
-    return ZERO
+        end = _NOT_OURS
+    elif not armed or isinstance(error, BackendError) or getattr(error, "__notes__", None):
+        end = _UNKNOWN
+    return end._replace(forced=_forced_by(error))
+
+
+def _forced_by(error: BaseException) -> EndData | None:
+    """Return the cause of an end by force; None where a person asked for it (Ctrl-C)."""
+    if isinstance(error, KeyboardInterrupt):
+        return None
+    if isinstance(error, TripError):
+        cause = error.reason
+    else:
+        cause = "deadline" if isinstance(error, DeadlineError) else type(error).__name__
+    words = (str(error) or cause)[:_WORDS_CHARS_MAX].encode("utf-8", "replace")  # paths may have surrogates
+    return EndData(cause, words.decode())

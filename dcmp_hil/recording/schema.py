@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from dcmp_hil.common.printable_text import readable
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.values import DATA, Event, EventKind, Level
+from dcmp_hil.values import DATA, OPTIONAL_DATA, Event, EventKind, Level
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -104,7 +104,7 @@ def event_from(document: Mapping[str, Any]) -> Event:
         if name not in set(EventKind):
             return Event(t, level, EventKind.OTHER, text)
         kind = EventKind(name)
-        if kind not in _ADAPTERS:
+        if kind not in _ADAPTERS or (data is None and kind in OPTIONAL_DATA):
             return Event(t, level, kind, text)
         return Event(t, level, kind, text, _ADAPTERS[kind].validate_python(data))
     except (KeyError, TypeError, ValueError, OverflowError) as error:

@@ -33,6 +33,7 @@ from dcmp_hil.values import (
     DATA,
     CauseData,
     ChangeData,
+    EndData,
     Event,
     EventKind,
     LimitData,
@@ -64,6 +65,7 @@ EXAMPLES: dict[type[EventData], EventData] = {
     LinkData: LinkData({"lost": 3, "late": 0}),
     ChangeData: ChangeData({"controller.kp_1_s2": 0.1 + 0.2, "controller.kind": "pd"}),
     CauseData: CauseData("speed"),
+    EndData: EndData("LinkError", "The cable is out."),
 }
 
 
@@ -164,6 +166,11 @@ def test_every_kind_comes_back_to_the_bit(kind: EventKind) -> None:
         read = event_from(json.loads(event_to_bytes(event, 5)))
         assert read == event
         assert type(read.data) is type(data)
+
+
+def test_an_end_without_data_is_one_as_it_was_asked_for() -> None:
+    event = Event(1.0, "INFO", EventKind.END, "amplifier at 0 V")
+    assert event_from(json.loads(event_to_bytes(event, 5))) == event
 
 
 def test_a_kind_of_a_later_version_is_read_as_another() -> None:

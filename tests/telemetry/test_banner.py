@@ -9,7 +9,7 @@ import rerun as rr
 
 from dcmp_hil.telemetry.rerun.banner import AMBER, GREEN, GREY, LAST, PATH, RED, Banner
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
-from dcmp_hil.values import CauseData, ChangeData, Event, EventKind, LimitData, PhaseData
+from dcmp_hil.values import CauseData, ChangeData, EndData, Event, EventKind, LimitData, PhaseData
 from tests.telemetry.runs import VIEW
 from tests.telemetry.test_marks import TRIP
 
@@ -49,10 +49,26 @@ def test_a_trip_in_large_words_with_cause_and_cure() -> None:
     assert banner(phase("running"), lost).text.startswith("# ENDED BY A FAULT at 6.000 s\n\n**0 V was not")
 
 
+def test_an_end_says_what_it_was() -> None:
+    end = Event(9.0, "INFO", EventKind.END, "amplifier at 0 V")
+    assert banner(phase("running"), end).text == "**ENDED** · amplifier at 0 V"
+    assert not banner(phase("running"), end).tripped
+    kept = Event(9.0, "WARN", EventKind.DEVICE_END, "the device ended the run by itself")
+    assert not banner(phase("running"), kept, end).tripped
+    failed = end._replace(data=EndData("ZeroDivisionError", "division by zero"))
+    made = banner(phase("running"), failed)
+    assert made.text == (
+        "# ENDED BY A FAULT: ZeroDivisionError, at 9.000 s\n\n**division by zero.** Amplifier at 0 V."
+    )
+    assert (made.tripped, made.colour(9.0)) == (True, RED)
+
+
 def test_the_first_cause_stays() -> None:
     later = Event(9.0, "ERROR", EventKind.END, "0 V was not confirmed")
     assert banner(phase("tripped", 1.999), TRIP, later).text.startswith("# TRIPPED: travel, at 1.999 s")
     assert "not confirmed" not in banner(TRIP, later).text
+    later = later._replace(data=EndData("LinkError", "The cable is out."))
+    assert banner(TRIP, later).text == banner(TRIP).text
 
 
 @pytest.mark.parametrize(

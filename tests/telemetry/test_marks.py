@@ -14,7 +14,7 @@ from dcmp_hil.telemetry.rerun.marks import MARKS, Marks, mark_of
 from dcmp_hil.telemetry.rerun.plots import plots
 from dcmp_hil.telemetry.rerun.rails import reach_of
 from dcmp_hil.telemetry.rerun.sink import RerunSink
-from dcmp_hil.values import CauseData, ChangeData, Event, EventKind, LimitData, LinkData, PhaseData
+from dcmp_hil.values import CauseData, ChangeData, EndData, Event, EventKind, LimitData, LinkData, PhaseData
 from tests.telemetry.runs import VIEW, blocks, chunks, entities, read_back, values
 
 if TYPE_CHECKING:
@@ -64,7 +64,8 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         *((CHANGE, "change"), (WARNING, "warning"), (PHASE, "trip"), (TRIP, "trip")),
         (Event(1.0, "ERROR", EventKind.DEADLINE, "too late", CauseData("deadline")), "trip"),
-        (Event(1.0, "WARN", EventKind.DEVICE_END, "the device ended the run"), "trip"),
+        (Event(1.0, "WARN", EventKind.DEVICE_END, "the device ended the run"), "warning"),
+        (Event(1.0, "INFO", EventKind.END, "amplifier at 0 V", EndData("OSError", "No file.")), "trip"),
         (Event(1.0, "ERROR", EventKind.END, "0 V was not confirmed"), "trip"),
         (Event(1.0, "INFO", EventKind.END, "amplifier at 0 V"), None),
         (Event(1.0, "INFO", EventKind.PHASE, "tripped", PhaseData("running")), None),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.telemetry.rerun.font_text import markdown
 from dcmp_hil.telemetry.rerun.marks import is_trip
-from dcmp_hil.values import CauseData, ChangeData, EventKind, PhaseData
+from dcmp_hil.values import CauseData, ChangeData, EndData, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,8 +35,8 @@ class Banner:
         self.tripped = False
         self._phase = "arming"
         self._change = self._warning = self._end = ""
-        self._trip = ("", 0.0)  # cause and time, s
-        self._text = ""
+        self._head, self._cause, self._text = "ENDED BY A FAULT", "", ""  # of a trip
+        self._tripped = 0.0  # s, time of the trip
         self._warned = -_WARNING_TIME_S  # time, s
         self._last: list[str] = []
 
@@ -57,7 +57,7 @@ class Banner:
         elif event.level in _LEVELS and not is_trip(event):
             self._warned, self._warning = event.t, f"{event.t:.3f} s: {event.text}"
         if event.kind is EventKind.END:
-            self._end = event.text
+            self._phase, self._end = "ended", event.text
         if is_trip(event):
             self._take_trip(event)
         if isinstance(event.data, PhaseData) or (event.kind in _OF_THE_START and event.level not in _LEVELS):
@@ -66,11 +66,17 @@ class Banner:
         del self._last[_LAST_COUNT:]
 
     def _take_trip(self, event: Event) -> None:
-        cause = event.data.cause if isinstance(event.data, CauseData) else self._trip[0]
-        self._trip = (cause, event.t if not self.tripped else self._trip[1])
+        """Take the first cause; its time is that of the phase, which comes before."""
+        self._tripped = self._tripped if self.tripped else event.t
         self.tripped = True
-        if not isinstance(event.data, PhaseData) and not self._text:
-            self._text = event.text
+        if isinstance(event.data, PhaseData) or self._text:
+            return
+        said = self._text = event.text
+        if isinstance(event.data, CauseData):
+            self._cause, self._head = event.data.cause, f"TRIPPED: {event.data.cause},"
+        elif isinstance(event.data, EndData):
+            self._head = f"ENDED BY A FAULT: {event.data.cause},"
+            self._text = f"{event.data.words.rstrip().rstrip('.')}. {said[:1].upper()}{said[1:]}."
 
     def colour(self, t: float) -> tuple[int, int, int]:
         """Return the colour of the lamp at `t`, s."""
@@ -78,22 +84,19 @@ class Banner:
             return RED
         if t - self._warned < _WARNING_TIME_S:
             return AMBER
-        return GREEN if self._phase in _DRIVEN and not self._end else GREY
+        return GREEN if self._phase in _DRIVEN else GREY
 
     @property
     def text(self) -> str:
         """Return the banner in Markdown."""
         if self.tripped:
-            cause, t = self._trip
-            head = (
-                f"# TRIPPED: {markdown(cause)}, at {t:.3f} s" if cause else f"# ENDED BY A FAULT at {t:.3f} s"
-            )
-            return f"{head}\n\n{emphasised(self._text, cause)}".rstrip()
+            head = f"# {markdown(self._head)} at {self._tripped:.3f} s"
+            return f"{head}\n\n{emphasised(self._text, self._cause)}".rstrip()
         parts = [
             f"**{self._phase.upper()}**",
+            markdown(self._end),
             markdown(self._change),
             f"▲ {markdown(self._warning)}" if self._warning else "",
-            f"**ended**: {markdown(self._end)}" if self._end else "",
         ]
         return " · ".join(part for part in parts if part)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.telemetry.rerun.rails import WINDOW_S
-from dcmp_hil.values import EventKind, PhaseData
+from dcmp_hil.values import EndData, EventKind, PhaseData
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dcmp_hil.values import Event
 
 _REPEAT_TIME_MIN_S = 0.5  # s between two marks of a kind: a limit that chatters is one mark
-_FORCED_ENDS = {EventKind.TRIP, EventKind.DEADLINE, EventKind.DEVICE_END}
+_FORCED_ENDS = {EventKind.TRIP, EventKind.DEADLINE}
 
 
 class MarkStyle(NamedTuple):
@@ -35,7 +35,7 @@ MARKS = {
 def is_trip(event: Event) -> bool:
     """Return whether the run ended by force at this event."""
     tripped = isinstance(event.data, PhaseData) and event.data.phase == "tripped"
-    failed = event.kind is EventKind.END and event.level == "ERROR"
+    failed = isinstance(event.data, EndData) or (event.kind is EventKind.END and event.level == "ERROR")
     return tripped or failed or event.kind in _FORCED_ENDS
 
 
