@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 PATH, LAMP, LAST = "banner", "lamp", "events/last"
 GREY, GREEN, AMBER, RED = (90, 94, 100), (40, 150, 70), (235, 160, 20), (190, 30, 30)
-_WARNING_TIME_S = 10.0  # s for which a warning has the lamp
+_WARNING_TIME_S, _WARNING_TEXT_TIME_S = 10.0, 30.0  # s for which a warning has the lamp, and its words
+_CHANGE_CHARS_MAX, _WARNING_CHARS_MAX = 56, 76
+"""Characters: with the phase 150, which a screen of 1366 has in a line; the banner has room for one."""
 _LAST_COUNT = 12  # events
 _DRIVEN = {"engaging", "running"}
 _OF_THE_START = {EventKind.HOST, EventKind.GRANT}  # what is as wanted there is in the log alone
@@ -86,17 +88,17 @@ class Banner:
             return AMBER
         return GREEN if self._phase in _DRIVEN else GREY
 
-    @property
-    def text(self) -> str:
-        """Return the banner in Markdown."""
+    def text(self, t: float) -> str:
+        """Return the banner as of `t`, s, in Markdown; one line while there was no trip."""
         if self.tripped:
             head = f"# {markdown(self._head)} at {self._tripped:.3f} s"
             return f"{head}\n\n{emphasised(self._text, self._cause)}".rstrip()
+        warned = self._warning and t - self._warned < _WARNING_TEXT_TIME_S
         parts = [
             f"**{self._phase.upper()}**",
             markdown(self._end),
-            markdown(self._change),
-            f"▲ {markdown(self._warning)}" if self._warning else "",
+            markdown(_cut(self._change, _CHANGE_CHARS_MAX)),
+            f"▲ {markdown(_cut(self._warning, _WARNING_CHARS_MAX))}" if warned else "",
         ]
         return " · ".join(part for part in parts if part)
 
@@ -104,6 +106,11 @@ class Banner:
     def last(self) -> str:
         """Return the last events in Markdown, the newest first."""
         return "  \n".join(self._last)
+
+
+def _cut(text: str, most: int) -> str:
+    """Return a text, or its beginning and an ellipsis: the list of events has all of it."""
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
 def emphasised(text: str, cause: str) -> str:

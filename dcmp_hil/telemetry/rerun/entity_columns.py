@@ -50,6 +50,7 @@ class Frames:
         self._plots, self._link = PlotColumns(rig), LinkColumns()
         self._banner = banner.Banner()
         self._lamp: tuple[int, int, int] | None = None  # as it was sent
+        self._said = self._banner.text(0.0)  # as it was sent
         self._histograms = [
             (one, FixedRangeHistogram(one.low * rig.period, one.high * rig.period)) for one in HISTOGRAMS
         ]
@@ -71,7 +72,7 @@ class Frames:
         """Return the calls for consecutive cycles, at least one and not more than about a second."""
         self._now = float(block["t"][-1])
         calls = [*self._timed(self._plots.of_block(block)), *self._poses(block), *self._states(block)]
-        calls += [*self._slow(block["t"]), *self._lamp_at(self._now)]
+        calls += [*self._slow(block["t"]), *self._lamp_at(self._now), *self._faded(self._now)]
         for one, histogram in self._histograms:
             if histogram.add(block["t"], block[one.field]):
                 calls.append(self._bars(one, histogram, block["t"][-1:]))
@@ -116,7 +117,8 @@ class Frames:
     def _words(self, t: float) -> list[Call]:
         """Return banner, lamp and the last events, as they are now."""
         times = self._times(np.array([t]))
-        pages = ((banner.PATH, self._banner.text), (banner.LAST, self._banner.last))
+        self._said = self._banner.text(t)
+        pages = ((banner.PATH, self._said), (banner.LAST, self._banner.last))
         return [
             *((path, times, _page(text)) for path, text in pages),
             *self._lamp_at(t),
@@ -130,6 +132,12 @@ class Frames:
             strip = np.array([[-1.0, 0.0], [1.0, 0.0]])
             lamp = rr.LineStrips2D.columns(strips=[strip], colors=[colour], radii=[_LAMP_RADIUS])
             yield banner.LAMP, self._times(np.array([t])), lamp
+
+    def _faded(self, t: float) -> Iterator[Call]:
+        """Yield the banner where a warning has left it."""
+        if self._banner.text(t) != self._said:
+            self._said = self._banner.text(t)
+            yield banner.PATH, self._times(np.array([t])), _page(self._said)
 
     def _timed(self, rows: Iterable[Rows]) -> Iterator[Call]:
         last: NDArray[np.float64] | None = None
