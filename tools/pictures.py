@@ -29,7 +29,7 @@ from dcmp_hil.values import Event
 from tests.live.here import Here
 from tests.panel.browser import browser
 from tests.telemetry.pixels import coloured
-from tools.screenshot import Seen, headless_viewer, wait_until_loaded
+from tools.screenshot import Seen, draw, headless_viewer, wait_until_loaded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -46,8 +46,6 @@ CHANGED_AT_S, PUSHED_AT_S, SHOWN_AT_S = 11.0, 13.0, 12.0
 FIRST_PORT = 23_500  # of the ports tried for the recording's server
 _BLOCK_ROWS = 100
 _GREETING_TIME_S = 5.0  # s after the start, the viewer's first notice leaves the picture
-_SETTLE_TIME_S = 1.0  # s without a change
-_TRIALS_MAX = 30
 _CATCH_UP_TIMEOUT_S = 240.0  # s
 _WEB_SETTLE_TIME_S = 2.0  # s; a page is drawn a few times a second without a graphics card
 _SIGNS = {
@@ -162,30 +160,26 @@ def native(folder: Path, size: str) -> Iterator[tuple[str, Path, ViewerClient]]:
                 stage.sink.close()
             _catch_up(viewer, stage.now)
             picture = folder / f"native-{state}-{size}.png"
-            _draw(viewer, picture.resolve())
+            draw(viewer, picture)
             yield state, picture, viewer
 
 
 def _catch_up(viewer: ViewerClient, now: float) -> None:
+    """Wait until the viewer has the data of `now`, s.
+
+    Raises
+    ------
+    TimeoutError
+        If they do not come.
+    """
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_CATCH_UP_TIMEOUT_S * 1e9)
     while clock.now_ns() < end_ns:
         shown = [r.current_time or 0 for r in viewer.get_state().recordings if r.current_timeline]
         if shown and 1e-9 * max(shown) >= now - 1e-6:
-            break
-        pause(0.1)
-
-
-def _draw(viewer: ViewerClient, picture: Path) -> None:
-    """Save what the viewer shows as soon as it has come to rest, or after half a minute."""
-    before = b""
-    for _ in range(_TRIALS_MAX):
-        pause(_SETTLE_TIME_S)
-        viewer.save_screenshot(str(picture))
-        now = picture.read_bytes()
-        if now == before:
             return
-        before = now
+        pause(0.1)
+    raise TimeoutError(f"the viewer does not show {now:g} s of the run after {_CATCH_UP_TIMEOUT_S:g} s")
 
 
 def web(folder: Path, size: str) -> Iterator[tuple[str, Path]]:

@@ -22,6 +22,7 @@ from dcmp_hil.telemetry.rerun.viewer import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from uuid import UUID
 
     from rerun.experimental import LogEntry, ViewerClient, ViewerState
 
@@ -29,7 +30,10 @@ APT = "apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
 _START_TIMEOUT_S = 30.0  # s: the first picture of a software renderer takes a while
 _LOAD_TIMEOUT_S = 60.0  # s
 _SETTLE_TIME_S = 0.7  # s after a seek
+_CALM_TIME_S = 1.0  # s without a change
+_TRIALS_MAX, _SAVE_TRIALS_MAX = 30, 8  # pictures, and looks for one
 _GREETING_TIME_S = 5.0  # s after the start, the viewer's first notice leaves the picture
+_OF_THE_MACHINE = ("Software rasterizer", "Failed to render screenshot")  # which `save` asks for again
 FIRST_PORT = 21_000  # tried for the viewer's remote control
 
 
@@ -48,8 +52,8 @@ class Seen:
 
 
 def _is_complaint(entry: LogEntry) -> bool:
-    """Return whether a report concerns the recording, and not a machine without a graphics card."""
-    return entry.level in {"WARN", "ERROR"} and "Software rasterizer" not in entry.message
+    """Return whether a report concerns the recording, and not a machine: busy, or without a graphics card."""
+    return entry.level in {"WARN", "ERROR"} and not any(words in entry.message for words in _OF_THE_MACHINE)
 
 
 @contextmanager
@@ -103,6 +107,56 @@ def wait_until_loaded(viewer: ViewerClient, within: float = _LOAD_TIMEOUT_S) -> 
         pause(0.1)
 
 
+def save(viewer: ViewerClient, picture: Path, view_id: str | UUID | None = None) -> None:
+    """Save what `viewer` draws next; see `draw`.
+
+    Raises
+    ------
+    ConnectionError, TimeoutError
+        If it draws nothing.
+    """
+    for left in reversed(range(_SAVE_TRIALS_MAX)):
+        try:
+            viewer.save_screenshot(str(picture.resolve()), view_id)
+        except (ConnectionError, TimeoutError):  # a busy computer draws nothing for the 15 s that Rerun waits
+            if not left:
+                raise
+        else:
+            return
+
+
+def draw(
+    viewer: ViewerClient, picture: Path, view_id: str | UUID | None = None, calm: float = _CALM_TIME_S
+) -> None:
+    """Save a picture of what `viewer` shows as soon as two in a row are alike.
+
+    Parameters
+    ----------
+    viewer
+        Its remote control.
+    picture
+        The .png file.
+    view_id
+        The view; None for the whole window.
+    calm
+        s between two pictures.
+
+    Raises
+    ------
+    TimeoutError
+        If no two of 30 are.
+    """
+    before = b""
+    for _ in range(_TRIALS_MAX):
+        pause(calm)
+        save(viewer, picture, view_id)
+        now = picture.read_bytes()
+        if now == before:
+            return
+        before = now
+    raise TimeoutError(f"{picture.name}: the viewer did not come to rest in {_TRIALS_MAX} pictures")
+
+
 def look(
     viewer: ViewerClient, picture: Path, at: float | None = None, settle: float = _SETTLE_TIME_S
 ) -> Seen:
@@ -111,7 +165,7 @@ def look(
     if at is not None:
         viewer.set_time("loop_time", duration=at, play_state="paused")
     pause(settle)
-    viewer.save_screenshot(str(picture.resolve()))
+    save(viewer, picture)
     return Seen(viewer.get_state(), viewer.get_logs())
 
 

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 _DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def vulkan() -> None:
-    """Skip without a viewer that can draw, saying how to get it; under CI that is a failure."""
+    """Skip without a viewer that can draw, saying how to get it; under CI that is a failure.
+
+    It is of the widest scope, so that it comes before what draws pictures for a whole module.
+    """
     missing = not any(folder.is_dir() and any(folder.iterdir()) for folder in _DRIVERS)
     if not (missing or not window.viewer_binary().exists()):
         return

@@ -9,14 +9,13 @@ import pytest
 from PIL import Image
 
 from dcmp_hil.ipc.ring import FIELDS
-from dcmp_hil.platform.clock import pause
 from dcmp_hil.telemetry.rerun.plots import plots
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, REFERENCE_RGB, VOLTAGE_RGB
 from dcmp_hil.values import Event, EventKind, PhaseData
 from tests.telemetry.runs import VIEW, blocks
 from tests.telemetry.test_marks import CHANGE, PHASE, TRIP
-from tools.screenshot import headless_viewer, look
+from tools.screenshot import draw, headless_viewer, wait_until_loaded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,11 +58,13 @@ def seen(
     wanted = {plot.titled for plot in plots()}
     pictures = {}
     with headless_viewer(str(folder / "run.rrd"), size=_SIZE) as viewer:
-        state = look(viewer, folder / "whole.png", _HOURS_S + (7.9 if request.param else 6.99), 2.0).state
-        for view in state.views:
+        wait_until_loaded(viewer)
+        at = _HOURS_S + (7.9 if request.param else 6.99)
+        viewer.set_time("loop_time", duration=at, play_state="paused")
+        draw(viewer, folder / "whole.png")
+        for view in viewer.get_state().views:
             if view.name in wanted:
-                viewer.save_screenshot(str(folder / "view.png"), view_id=view.view_id)
-                pause(0.1)
+                draw(viewer, folder / "view.png", view.view_id, calm=0.1)
                 with Image.open(folder / "view.png") as image:
                     pictures[view.name] = np.asarray(image.convert("RGB"), dtype=np.int16)
     assert pictures.keys() == wanted

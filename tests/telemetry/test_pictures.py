@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,12 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pytest
 
+from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.telemetry.rerun.marks import MARKS
 from dcmp_hil.telemetry.rerun.plots import Plot, plots
 from tests.panel.browser import needed
 from tests.telemetry.pixels import coloured, near, pixels
 from tools.pictures import CHANGED_AT_S, PUSHED_AT_S, SIZES, native, web
-from tools.screenshot import Seen
+from tools.screenshot import Seen, save
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,21 +97,28 @@ def _plots(viewer: ViewerClient, folder: Path) -> list[Shown]:
     for view in viewer.get_state().views:
         if view.visible and view.name in by_title:
             picture = folder / f"{len(found)}.png"
-            viewer.save_screenshot(str(picture), view_id=view.view_id)
+            save(viewer, picture, view.view_id)
             found.append(Shown(by_title[view.name], picture))
     return found
+
+
+def _keep(picture: Path) -> None:
+    """Keep a picture with the reports; two workers of a run may do so at once."""
+    _PICTURES.mkdir(parents=True, exist_ok=True)
+    with whole_file(_PICTURES / picture.name) as place:
+        shutil.copyfile(picture, place)
 
 
 @pytest.fixture(scope="module", params=SIZES)
 def screens(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Screen]:
     """Return both states of a run on one screen; pictures of the whole are kept with the reports."""
-    _PICTURES.mkdir(parents=True, exist_ok=True)
     found = {}
-    for state, _, viewer in native(_PICTURES, request.param):
+    for state, picture, viewer in native(tmp_path_factory.mktemp("whole"), request.param):
+        _keep(picture)
         folder = tmp_path_factory.mktemp(state)
         shown = _plots(viewer, folder)
         (words,) = [view for view in viewer.get_state().views if view.name == "State"]
-        viewer.save_screenshot(str(folder / "banner.png"), view_id=words.view_id)
+        save(viewer, folder / "banner.png", words.view_id)
         found[state] = Screen(shown, folder / "banner.png", Seen(viewer.get_state(), viewer.get_logs()))
     return found
 
@@ -160,10 +169,10 @@ def test_no_word_of_a_trip_is_cut(screens: dict[str, Screen]) -> None:
     assert rows[-_MARGIN_ROWS:].max() < 100
 
 
-def test_the_web_viewer_shows_both_states() -> None:
+def test_the_web_viewer_shows_both_states(tmp_path: Path) -> None:
     """`web` waits for the colours of a state's lane and mark, and raises if they do not come."""
     needed()
-    _PICTURES.mkdir(parents=True, exist_ok=True)
-    for state, picture in web(_PICTURES, SIZES[1]):
+    for state, picture in web(tmp_path, SIZES[1]):
+        _keep(picture)
         assert (coloured(picture, MARKS["trip"].colour) > _MARKS_PIXELS_MIN) == (state == "tripped")
         assert float(np.median(pixels(picture))) < 60.0  # it is dark
