@@ -23,6 +23,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Cycle, Sample
 from tools.bench_lateness import Lateness, lateness, period_us
+from tools.bench_observers import RATIO_MAX, observer_costs
 from tools.bench_telemetry import Endurance, endurance, record_us
 from tools.bench_wire import codec_us, round_trips
 
@@ -143,6 +144,7 @@ def _rows() -> list[Row]:
         ),
         _row("that by the matrix exponential", "us", "", lambda: _odd_step_us(setting, luenberger_copy)),
         _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
+        *_observer_rows(),
         _row(
             "sim-board: the same loop with wire and firmware, 200 us",
             "x",
@@ -155,6 +157,15 @@ def _rows() -> list[Row]:
         *_wire_rows(),
         _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
         _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
+    ]
+
+
+def _observer_rows() -> list[Row]:
+    """One step of every observer on the samples of one ride, taken in turn."""
+    costs = observer_costs()
+    return [
+        *(_row_of(f"{kind}, one step on a ride", us, "us", "") for kind, us in costs.us.items()),
+        Row("ratio of the best, friction_kalman to super_twisting", *costs.ratio, "x", f"<= {RATIO_MAX:g}"),
     ]
 
 
