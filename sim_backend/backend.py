@@ -6,8 +6,9 @@ import math
 import random
 from typing import TYPE_CHECKING, Self
 
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.errors import LinkError
-from dcmp_hil.values import Sample, Truth
+from dcmp_hil.values import Fault, Sample, Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import make_encoder
 from sim_backend.pacer import Pacer
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.platform.clock import Clock
     from sim_backend.plant_fault_hooks import PlantFaults
+
+_NO_FAULT = Fault.NONE
 
 
 class SimBackend:
@@ -43,9 +46,9 @@ class SimBackend:
     def __init__(self, rig: Rig, clock: Clock, faults: PlantFaults = HEALTHY) -> None:
         self._pace = Pacer(clock, rig.period)
         self._period = rig.period
-        self._skips = rig.timing.overrun == "skip"
+        self._skips, self._lost = rig.timing.overrun == "skip", rig.sim.lost_samples
+        self._has_gaps = self._skips or self._lost > 0.0
         self._tick = 0
-        self._lost = rig.sim.lost_samples
         self._losing = random.Random(f"lost {rig.sim.seed}")  # noqa: S311 - it must repeat itself
         self._plant = faults.plant(make_plant(rig))
         self._encoder = faults.encoder(make_encoder(rig))
@@ -86,29 +89,29 @@ class SimBackend:
         if tick:
             voltage = self._amplifier.step()
             self._truth = self._plant.advance(voltage)
-            if self._lost:
-                voltage, tick = self._lose(voltage, tick)
-            if self._skips:
-                voltage, tick = self._skip_to_newest(voltage, tick)
+            if self._has_gaps:
+                voltage, tick = self._after_gap(voltage, tick)
         self._tick = tick + 1
         self._pace.wait_for(tick)
-        return Sample(tick * self._period, self._encoder.read(self._truth.position), voltage)
+        position = self._encoder.read(self._truth.position)
+        return make(Sample, (tick * self._period, position, voltage, _NO_FAULT))  # 0.09 us less
 
-    def _lose(self, voltage: float, tick: int) -> tuple[float, int]:
-        """Simulate periods whose samples are lost; return the voltage of the last one, V, and its tick."""
+    def _after_gap(self, voltage: float, tick: int) -> tuple[float, int]:
+        """Simulate periods without a sample; return the voltage of the last one, V, and its tick.
+
+        They are those whose samples are lost, and then those that are due already and skipped.
+        """
         while self._losing.random() < self._lost:
-            voltage = self._amplifier.step()
-            self._truth = self._plant.advance(voltage)
-            tick += 1
+            voltage, tick = self._advance(), tick + 1
+        for _ in range(self._pace.missed(tick) if self._skips else 0):
+            voltage, tick = self._advance(), tick + 1
         return voltage, tick
 
-    def _skip_to_newest(self, voltage: float, tick: int) -> tuple[float, int]:
-        """Simulate the periods that are due already; return the voltage of the last one, V, and its tick."""
-        for _ in range(self._pace.missed(tick)):
-            voltage = self._amplifier.step()
-            self._truth = self._plant.advance(voltage)
-            tick += 1
-        return voltage, tick
+    def _advance(self) -> float:
+        """Simulate one period, and return the voltage applied over it, V."""
+        voltage = self._amplifier.step()
+        self._truth = self._plant.advance(voltage)
+        return voltage
 
     def write(self, voltage: float) -> None:
         """Send a voltage to the amplifier, V."""

