@@ -47,7 +47,8 @@ FIRST_PORT = 23_500  # of the ports tried for the recording's server
 _BLOCK_ROWS = 100
 _GREETING_TIME_S = 5.0  # s after the start, the viewer's first notice leaves the picture
 _CATCH_UP_TIMEOUT_S = 240.0  # s
-_WEB_SETTLE_TIME_S = 2.0  # s; a page is drawn a few times a second without a graphics card
+_WEB_SETTLE_TIME_S = 0.5  # s between two pictures; without a graphics card one takes as long
+_LOADING_SIZE = "640x480"  # of a page that loads: it is drawn all the time, at the cost of what it loads
 _SIGNS = {
     "running": ((71, 149, 75), MARKS["change"].colour),
     "tripped": ((188, 63, 63), MARKS["trip"].colour),
@@ -182,47 +183,56 @@ def _catch_up(viewer: ViewerClient, now: float) -> None:
     raise TimeoutError(f"the viewer does not show {now:g} s of the run after {_CATCH_UP_TIMEOUT_S:g} s")
 
 
-def web(folder: Path, size: str) -> Iterator[tuple[str, Path]]:
-    """Yield each state with its picture in the web viewer."""
-    width, height = (int(word) for word in size.split("x"))
+def web(folder: Path, *sizes: str) -> Iterator[tuple[str, Path]]:
+    """Yield each state with its picture in the web viewer, at each size."""
     stage = Stage()
     with (
         tempfile.TemporaryDirectory() as profile,
         pages(stage.port) as address,
         browser(Path(profile), draws=True) as page,
     ):
-        page.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
-        )
+        _resize(page, _LOADING_SIZE)
+        stage.go_on(STATES[0])
         page.get(address)
-        for state in STATES:
+        _draw_page(page, Path(profile) / "loaded.png", _SIGNS[STATES[0]][:1])
+        for state, order in zip(STATES, (sizes, sizes[::-1]), strict=True):  # of one size two in a row
             stage.go_on(state)
             if state == STATES[-1]:
                 stage.sink.close()
-            picture = folder / f"web-{state}-{size}.png"
-            _draw_page(page, picture, _SIGNS[state])
-            yield state, picture
+            for size in order:
+                _resize(page, size)
+                picture = folder / f"web-{state}-{size}.png"
+                _draw_page(page, picture, _SIGNS[state])
+                yield state, picture
+
+
+def _resize(page: Chrome, size: str) -> None:
+    width, height = (int(word) for word in size.split("x"))
+    page.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
+    )
 
 
 def _draw_page(page: Chrome, picture: Path, signs: Sequence[tuple[int, int, int]]) -> None:
-    """Save a page when the colours of a state are on it, and once more a moment later.
+    """Save a page as soon as the colours of a state are on it, and two pictures in a row are alike.
 
     Raises
     ------
     TimeoutError
-        If one of them does not appear.
+        If one of them does not appear, or the page does not come to rest.
     """
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_CATCH_UP_TIMEOUT_S * 1e9)
-    page.save_screenshot(str(picture))
-    while min(coloured(picture, sign) for sign in signs) < _SIGN_PIXELS_MIN:
-        if clock.now_ns() > end_ns:
-            raise TimeoutError(f"the web viewer has not drawn {picture.name}")
+    before = b""
+    while clock.now_ns() < end_ns:
+        now = page.get_screenshot_as_png()
+        picture.write_bytes(now)
+        if now == before and min(coloured(picture, sign) for sign in signs) >= _SIGN_PIXELS_MIN:
+            return
+        before = now
         pause(_WEB_SETTLE_TIME_S)
-        page.save_screenshot(str(picture))
-    pause(_WEB_SETTLE_TIME_S)
-    page.save_screenshot(str(picture))
+    raise TimeoutError(f"the web viewer has not drawn {picture.name}, or does not come to rest")
 
 
 def pictures(folder: Path, sizes: Sequence[str], *, pages_too: bool) -> None:
@@ -238,9 +248,9 @@ def pictures(folder: Path, sizes: Sequence[str], *, pages_too: bool) -> None:
             complaints = Seen(viewer.get_state(), viewer.get_logs()).complaints
             if complaints:
                 raise RuntimeError(f"{state}, {size}: {'; '.join(complaints)}")
-        if pages_too:
-            for _ in web(folder, size):
-                pass
+    if pages_too:
+        for _ in web(folder, *sizes):
+            pass
 
 
 def main() -> int:
