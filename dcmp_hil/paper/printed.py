@@ -22,7 +22,7 @@ class PrintedEq9(PaperObserver):
 
     def disturbance(self) -> float:
         """Return w_hat by the printed eq. (9), rad/s2."""
-        return self.v3 + self.L2 * self.v1 + self.f0 * self.v2
+        return self.v3 + self.L2 * self.v1 + self._f0 * self.v2
 
 
 class PrintedEq8(PaperObserver):
@@ -44,7 +44,7 @@ class PrintedEq8(PaperObserver):
         self.v1, self.v2, self.v3 = v1 + dt * (a + v2), v2 + dt * n2, v3 + dt * n3
         z1, z2 = self._z1, self._z2
         self._z1 = z1 + dt * (z2 + self.L1 * e)
-        self._z2 = z2 + dt * (u - self.f0 * z2 + self.L2 * e)
+        self._z2 = z2 + dt * (u - self._f0 * z2 + self.L2 * e)
 
 
 class PrintedEq10(PdCompensated):

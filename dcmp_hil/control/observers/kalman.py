@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from dcmp_hil.common.section import Positive
-from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
-from dcmp_hil.control.observers.settings import ObserverSettings
-from dcmp_hil.values import Estimate, Sample
+from dcmp_hil.control.observers.settings import OneGainSettings
+from dcmp_hil.control.observers.stepwise import StepwiseObserver
+from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
@@ -18,15 +18,10 @@ _COUNT_VARIANCE = 1.0 / 12.0  # counts^2, of a value that lies anywhere in its c
 _VELOCITY_VARIANCE, _DISTURBANCE_VARIANCE = 1e-8, 100.0  # (rad/s)2, (rad/s2)2; at rest at the start
 
 
-class KalmanTuning(NamedTuple):
-    """The key that may change in a run."""
-
-    w_noise: float  # (rad/s2)2/s
-
-
-class KalmanSettings(ObserverSettings):
+class KalmanSettings(OneGainSettings):
     """`[observer]` with `kind = "kalman"`."""
 
+    gain: ClassVar = "w_noise"
     kind: Literal["kalman"]
     w_noise: Positive = 10.0
     """Noise of the disturbance's random walk, (rad/s2)2/s: higher is faster, and less quiet."""
@@ -34,15 +29,6 @@ class KalmanSettings(ObserverSettings):
     def build(self, context: ObserverContext) -> Kalman:
         """Make the observer for a rig."""
         return Kalman(context, w_noise=self.w_noise)
-
-    @classmethod
-    def tunable(cls) -> tuple[str, ...]:
-        """Return the keys that may change in a run."""
-        return ("w_noise",)
-
-    def tuning(self, context: ObserverContext) -> KalmanTuning:  # noqa: ARG002
-        """Return what the observer is retuned with."""
-        return KalmanTuning(self.w_noise)
 
     def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:  # noqa: ARG002
         """Return a fault on an ideal encoder, whose noise is 0."""
@@ -54,7 +40,7 @@ class KalmanSettings(ObserverSettings):
         )
 
 
-class Kalman:
+class Kalman(StepwiseObserver):
     """Kalman filter of (x1, x2, w) with w' white noise (Simon, Optimal State Estimation, 2006, chapter 5).
 
         x1' = x2,  x2' = -f0 x2 + w + u,  w' = n.
@@ -71,38 +57,25 @@ class Kalman:
     """
 
     def __init__(self, context: ObserverContext, *, w_noise: float = 10.0) -> None:
-        self._f0, self._ku = context.model.f0, context.model.ku
-        self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
+        super().__init__(context)
         count = 2.0 * math.pi / context.counts_per_rev if context.counts_per_rev else 0.0
         self._variance = _COUNT_VARIANCE * count * count
         self._w_noise = w_noise
-        self._t = math.nan
         self._state = (0.0, 0.0, 0.0)
         self._p = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # P00 P01 P02 P11 P12 P22
 
-    def retune(self, tuning: KalmanTuning) -> None:
+    def retune(self, w_noise: float) -> None:
         """Change the noise; the state stays."""
-        self._w_noise = tuning.w_noise
+        self._w_noise = w_noise
 
-    def update(self, sample: Sample) -> Estimate:
-        """Advance to `sample.t` over the voltage really applied, and correct by its position.
+    def _restart(self, y: float) -> Estimate:
+        self._state = (y, 0.0, 0.0)
+        self._p = (self._variance, 0.0, 0.0, _VELOCITY_VARIANCE, 0.0, _DISTURBANCE_VARIANCE)
+        return Estimate(y, 0.0, 0.0)
 
-        Raises
-        ------
-        ProtocolError
-            If device time does not advance.
-        """
-        t, y, voltage, _ = sample
-        step = t - self._t
-        if step <= 0.0:
-            raise standing_still(self._t, t)
-        if step <= self._restart_after:
-            self._predict(step, self._ku * voltage)
-            self._correct(y)
-        else:  # the first sample, or one after a gap too long to bridge
-            self._state = (y, 0.0, 0.0)
-            self._p = (self._variance, 0.0, 0.0, _VELOCITY_VARIANCE, 0.0, _DISTURBANCE_VARIANCE)
-        self._t = t
+    def _advance(self, step: float, u: float, y: float) -> Estimate:
+        self._predict(step, u)
+        self._correct(y)
         return Estimate(*self._state)
 
     def _predict(self, step: float, u: float) -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from dcmp_hil.common.section import Positive
-from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
 from dcmp_hil.control.observers.settings import ObserverSettings
-from dcmp_hil.values import Estimate, Sample
+from dcmp_hil.control.observers.stepwise import StepwiseObserver
+from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
     from dcmp_hil.control.observers import ObserverContext
@@ -74,7 +74,7 @@ class PaperSettings(ObserverSettings):
         return ""
 
 
-class PaperObserver:
+class PaperObserver(StepwiseObserver):
     """Super-twisting observer by explicit Euler steps, for the reproduction of the paper.
 
     Eq. (8) is read with the auxiliary that the paper's misprint hides (it prints v1' twice):
@@ -102,41 +102,34 @@ class PaperObserver:
         M: float = 1000.0,
         from_zero: bool = False,
     ) -> None:
-        self.f0, self._ku = context.model.f0, context.model.ku
+        super().__init__(context)
         self.L1, self.L2 = L1, L2
         self._n1_gain = _LAMBDA1 * M ** (1 / 3)
         self._n2_gain = _LAMBDA2 * math.sqrt(M)
         self._n3_gain = _LAMBDA3 * M
         self._from_zero = from_zero
-        self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
-        self._t = self._y = math.nan
+        self._y = math.nan
         self._z1 = self._z2 = 0.0
         self.v1 = self.v2 = self.v3 = 0.0
 
-    def update(self, sample: Sample) -> Estimate:
-        """Step from the stored position to `sample.t`, then store the new one.
+    def _advance(self, step: float, u: float, y: float) -> Estimate:
+        self._euler_step(step, u)  # from the stored position
+        self._y = y
+        return self._estimate()
 
-        Raises
-        ------
-        ProtocolError
-            If device time does not advance.
-        """
-        t, y, voltage, _ = sample
-        dt = t - self._t
-        if dt <= 0.0:
-            raise standing_still(self._t, t)
-        if dt <= self._restart_after:
-            self._euler_step(dt, self._ku * voltage)
-        else:  # the first sample (dt is NaN), or one after a gap too long to bridge
-            first = math.isnan(dt)
-            self._z1, self._z2 = (0.0 if first and self._from_zero else y), 0.0
-            self.v1 = self.v2 = self.v3 = 0.0
-        self._t, self._y = t, y
+    def _restart(self, y: float) -> Estimate:
+        first = math.isnan(self._t)
+        self._z1, self._z2 = (0.0 if first and self._from_zero else y), 0.0
+        self.v1 = self.v2 = self.v3 = 0.0
+        self._y = y
+        return self._estimate()
+
+    def _estimate(self) -> Estimate:
         return Estimate(self._z1 + self.v1, self._z2 + self.v2 + self.L1 * self.v1, self.disturbance())
 
     def disturbance(self) -> float:
         """Return w_hat by the corrected eq. (9), rad/s2."""
-        return self.v3 + (self.L1 + self.f0) * self.v2 + (self.L2 + self.f0 * self.L1) * self.v1
+        return self.v3 + (self.L1 + self._f0) * self.v2 + (self.L2 + self._f0 * self.L1) * self.v1
 
     def _euler_step(self, dt: float, u: float) -> None:
         e = self._y - self._z1
@@ -147,4 +140,4 @@ class PaperObserver:
         self.v1, self.v2, self.v3 = v1 + dt * n1, v2 + dt * n2, v3 + dt * n3
         z1, z2 = self._z1, self._z2
         self._z1 = z1 + dt * (z2 + self.L1 * e)
-        self._z2 = z2 + dt * (u - self.f0 * z2 + self.L2 * e)
+        self._z2 = z2 + dt * (u - self._f0 * z2 + self.L2 * e)

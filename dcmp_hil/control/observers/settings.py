@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from dcmp_hil.common.section import Section
 
@@ -84,3 +84,19 @@ class ObserverSettings(Section, ABC):
     def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:  # noqa: ARG002
         """Return why these gains must not be used on that rig, with the remedy; empty if they may be."""
         return ""
+
+
+class OneGainSettings(ObserverSettings):
+    """Settings of an observer with one gain, which may change in a run: its `retune` takes the new value."""
+
+    gain: ClassVar[str]
+    """Name of the key."""
+
+    @classmethod
+    def tunable(cls) -> tuple[str, ...]:
+        """Return the gain, which may change in a run."""
+        return (cls.gain,)
+
+    def tuning(self, context: ObserverContext) -> float:  # noqa: ARG002
+        """Return the gain's value."""
+        return float(getattr(self, self.gain))

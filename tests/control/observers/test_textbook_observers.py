@@ -11,9 +11,10 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import lfilter
 
 from dcmp_hil import load_rig
-from dcmp_hil.control.observers.derivative import Derivative, DerivativeTuning
-from dcmp_hil.control.observers.extended_state import ExtendedState, ExtendedStateTuning
-from dcmp_hil.control.observers.kalman import Kalman, KalmanTuning
+from dcmp_hil.control.observers.derivative import Derivative
+from dcmp_hil.control.observers.extended_state import ExtendedState
+from dcmp_hil.control.observers.kalman import Kalman
+from dcmp_hil.control.observers.settings import OneGainSettings
 from dcmp_hil.errors import ConfigError, ProtocolError
 from dcmp_hil.values import Estimate, Sample
 from tests.helpers import T, setting
@@ -130,9 +131,9 @@ def test_kalman_gain_settles_at_the_solution_of_the_riccati_equation() -> None:
 def test_a_change_of_the_gain_leaves_the_estimate_where_it_is() -> None:
     derivative, extended, kalman = Derivative(setting()), ExtendedState(setting()), Kalman(setting())
     pairs: tuple[tuple[Observer, Callable[[], None]], ...] = (
-        (derivative, lambda: derivative.retune(DerivativeTuning(200.0))),
-        (extended, lambda: extended.retune(ExtendedStateTuning(120.0))),
-        (kalman, lambda: kalman.retune(KalmanTuning(500.0))),
+        (derivative, lambda: derivative.retune(200.0)),
+        (extended, lambda: extended.retune(120.0)),
+        (kalman, lambda: kalman.retune(500.0)),
     )
     for observer, change in pairs:
         ramp = (Sample(k * T, 0.2 * k * T, 0.02 / _KU) for k in range(1500))
@@ -146,3 +147,13 @@ def test_a_change_of_the_gain_leaves_the_estimate_where_it_is() -> None:
 def test_kalman_is_refused_with_an_ideal_encoder() -> None:
     with pytest.raises(ConfigError, match="this encoder is ideal"):
         load_rig("bench-1khz", ["observer.kind=kalman", "encoder.counts_per_rev=ideal"])
+
+
+@pytest.mark.parametrize(
+    "key", ["derivative.bandwidth_rad_s", "extended_state.bandwidth_rad_s", "kalman.w_noise"]
+)
+def test_the_one_gain_of_the_settings_is_what_the_observer_is_retuned_with(key: str) -> None:
+    kind, _, gain = key.partition(".")
+    section = load_rig("bench-1khz", [f"observer.kind={kind}", f"observer.{gain}=77"]).observer
+    assert isinstance(section, OneGainSettings)
+    assert (section.tunable(), section.tuning(setting())) == ((gain,), 77.0)
