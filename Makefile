@@ -24,7 +24,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders pictures walk numbers panel-hour chatter stop-bars lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders pictures reversal walk numbers panel-hour chatter stop-bars lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -105,6 +105,9 @@ limits: $(DEV) ## wrong observers of six kinds against speed limits, 1,000 healt
 
 pictures: $(DEV) ## draw the dashboard running and tripped, native and web, at three sizes, into reports/pictures; ARGS=--readme for docs/images
 	@$(BIN)/python -m tools.pictures $(ARGS)
+
+reversal: $(DEV) ## draw a reversal as every observer sees it, the picture of docs/observers.md
+	@$(BIN)/python -m tools.reversal $(ARGS)
 
 encoders: $(DEV) ## healthy runs and reaction times by encoder and rate: the tables of docs/safety.md
 	@$(BIN)/python -m tools.encoders $(ARGS)
