@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.stage_factory import controller_of, observer_of
@@ -26,6 +26,7 @@ from dcmp_hil.safety.polarity_check import probe_for
 from dcmp_hil.safety.speed_resolution import resolution
 from dcmp_hil.safety.supervisor import Supervisor
 from dcmp_hil.telemetry.block import ReferenceAligner
+from dcmp_hil.telemetry.further_columns import joined
 from dcmp_hil.telemetry.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from dcmp_hil.ipc.mailbox import Mailbox
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.platform.stop_request import StopRequest
+    from dcmp_hil.telemetry.further_columns import FurtherColumns
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
     from dcmp_hil.trip_request import Check
@@ -58,8 +60,14 @@ def assemble(
     stop: StopRequest | None = None,
     clear: bool = False,
     faults: Faults = NO_FAULTS,
+    laws: Laws | None = None,
 ) -> tuple[LoopStages, Recorder]:
     """Make every stage of the loop, and the recorder that it reports to.
+
+    Parameters
+    ----------
+    laws
+        From `make_laws`, whose further columns `apart` knows; None makes them here.
 
     Raises
     ------
@@ -68,7 +76,7 @@ def assemble(
     """
     backend = open_backend(rig, clock, faults, clear=clear)
     trajectory = Trajectory(rig.reference.source(), rig.reference.soft_start_s)
-    observer, controller = make_observer(rig), make_controller(rig)
+    observer, controller, further = laws or make_laws(rig)
     recorder = Recorder(  # with its thread: nothing that may be refused comes after it
         backend.truth,
         ReferenceAligner(trajectory.at, rig.delay, lambda: trajectory.began),
@@ -78,6 +86,7 @@ def assemble(
         apart=apart,
         model=rig.model.values(),
         backend=backend,
+        further=further,
     )
     chatter = make_chatter(rig)
     changes = mailbox and LiveChanges(
@@ -113,6 +122,33 @@ def assemble(
         friction=make_friction(rig),
     )
     return stages, recorder
+
+
+class Laws(NamedTuple):
+    """Observer and controller, which close the loop, and what they tell of themselves.
+
+    Parameters
+    ----------
+    observer, controller
+        As the rig asks for.
+    further
+        The further columns of the run.
+    """
+
+    observer: Observer
+    controller: Controller
+    further: FurtherColumns
+
+
+def make_laws(rig: Rig) -> Laws:
+    """Make observer and controller; what they tell of themselves is known before telemetry begins.
+
+    Raises
+    ------
+    ConfigError
+        If a class named `module:Class` cannot be found or made.
+    """
+    return Laws(make_observer(rig), make_controller(rig), joined(()))
 
 
 def make_observer(rig: Rig) -> Observer:

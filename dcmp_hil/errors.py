@@ -105,6 +105,8 @@ class TripError(DcmpError):
         self.sentence = sentence
         self.remedy = remedy
         self.cycles: Sequence[Cycle] = ()  # the last second, filled in by the loop
+        self.further: tuple[str, ...] = ()  # names of further columns
+        self.further_values: Sequence[tuple[float, ...]] = ()  # of each of those cycles
         self.orderly = False  # the voltage was led to 0 V before: the device has no fault to keep
         self.explain: Callable[[], Explanation] | None = None
 

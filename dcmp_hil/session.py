@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
 from dcmp_hil import loop
-from dcmp_hil.assembly import assemble
+from dcmp_hil.assembly import assemble, make_laws
 from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
@@ -20,6 +20,7 @@ from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
 from dcmp_hil.platform.realtime import RealTime
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.result import Result
+from dcmp_hil.telemetry.further_columns import begin
 from dcmp_hil.telemetry.memory_sink import MemorySink
 from dcmp_hil.telemetry.sink_factories import Deferred, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
@@ -102,6 +103,7 @@ class Session:
         self._realtime = None if fast else RealTime(rig.timing)
         self._host = host_facts()
         statistics = Statistics(rig.period, window_from)
+        laws = make_laws(rig)
         self._apart: TelemetryProcess | None = None
         self._figures = SummarySink(statistics, MemorySink() if keep_columns else None)
         if fast:
@@ -117,6 +119,7 @@ class Session:
                 model=model,
                 unattended=pickle.dumps(control.unattended) if control else b"",
                 mailbox=control.file if control else None,
+                further=laws.further.names,
             )
         self._control = control
         mailbox = control.mailbox if control else None
@@ -130,8 +133,9 @@ class Session:
             stop=self.stop,
             clear=clear,
             faults=inject(rig, faults) if isinstance(faults, Iterable) else faults,
+            laws=laws,
         )
-        self._deferred = [sink for sink in here if isinstance(sink, Deferred)]
+        self._sinks = here
         self._realtime_factor = math.nan
 
     def run(self) -> None:
@@ -159,7 +163,7 @@ class Session:
                     self._run_loop()
         except TripError as seen:
             trip = seen.explained()  # milliseconds, and the device is at 0 V and disarmed
-            trip.cycles = tuple(recorder.recent)
+            recorder.fill(trip)
             end, why = end_after(trip, reached=reached, armed=armed), f"{trip} "
             self._tell("ERROR", EventKind.TRIP, f"tripped ({trip.reason}): {trip}", CauseData(trip.reason))
             raise trip from seen.__cause__
@@ -177,7 +181,7 @@ class Session:
                 self._control.close(f"{why}{end.sentence}", end.code)
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
-            recorder.link.finish(recorder.t)
+            recorder.tell_rest()
             if not why:
                 self._tell_how_device_ended()
             self._tell(end.level, EventKind.END, end.words, end.forced)
@@ -187,10 +191,15 @@ class Session:
 
     def _open_telemetry(self) -> AbstractContextManager[None]:
         """Make the sinks, here and in a process of their own, before anything is armed or real-time."""
-        for sink in self._deferred:
-            sink.make()
+        further = self._recorder.further
+        for sink in self._sinks:
+            if isinstance(sink, Deferred):
+                sink.make(further)
+            else:
+                begin(sink, further)
         if self._control:
-            self._control.open(self.rig, self._apart.ring_file if self._apart else None, self._warn_live)
+            ring = self._apart.ring_file if self._apart else None
+            self._control.open(self.rig, ring, self._warn_live, further)
             self.stop.wake(self._control.signals)
         if self._apart:
             self._apart.open(lambda: self.stop.requested)

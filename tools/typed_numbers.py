@@ -132,7 +132,9 @@ class _Setter:
         self.mailbox = Mailbox()
         self.signals, self.file, self.unattended = -1, None, None
 
-    def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
+    def open(
+        self, rig: Rig, ring: int | None, warn: Callable[[str], None], further: tuple[str, ...] = ()
+    ) -> None:
         """Nothing to start."""
 
     def wait_until_up(self, stopped: Callable[[], bool]) -> None:

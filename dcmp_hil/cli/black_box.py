@@ -20,8 +20,10 @@ def black_box(trip: TripError) -> str:
             *("position_estimate_rad", "velocity_estimate_rad_s", "disturbance_estimate_rad_s2"),
             *("position_reference_rad", "velocity_reference_rad_s", "acceleration_reference_rad_s2"),
             *("voltage_demand_V", "voltage_sent_V", "period_s", "lateness_s", "compute_s"),
+            *trip.further,
         ]
     )
-    for c in trip.cycles:
-        writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing])
+    further = trip.further_values or [()] * len(trip.cycles)
+    for c, more in zip(trip.cycles, further, strict=True):
+        writer.writerow([*c.sample, *c.estimate, *c.reference, c.demand, c.voltage, *c.timing, *more])
     return file.getvalue()

@@ -27,22 +27,26 @@ FIELDS = (
     *("position_reference", "velocity_reference", "acceleration_reference"),  # at t
     "began",  # device time at which the trajectory began; infinity before it did
 )
-"""Columns of a row, in SI units, in the order in which a Cycle and what goes with it are laid out flat."""
+"""Columns that every row has, in SI units, in the order in which a Cycle and what goes with it are laid out
+flat. A run may have further ones behind them, each named with its unit."""
 
 NO_REFERENCE = Reference(math.nan, math.nan, math.nan)
-_NUMBERED = struct.Struct(f"{1 + len(FIELDS)}d")  # the row's number comes first: it is the first to change
-_HEADER_BYTES, _ROW_BYTES = 64, _NUMBERED.size
-_pack = _NUMBERED.pack_into
+_HEADER_BYTES = 64
 
 
-def size_of(capacity: int) -> int:
-    """Return the bytes that a ring of so many rows takes."""
-    return _HEADER_BYTES + capacity * _ROW_BYTES
+def size_of(capacity: int, further: int = 0) -> int:
+    """Return the bytes that a ring of so many rows takes, each with so many further fields."""
+    return _HEADER_BYTES + capacity * _row(further).size
 
 
-def capacity_of(size: int) -> int:
-    """Return how many rows a ring of so many bytes holds."""
-    return (size - _HEADER_BYTES) // _ROW_BYTES
+def capacity_of(size: int, further: int = 0) -> int:
+    """Return how many rows a ring of so many bytes holds, each with so many further fields."""
+    return (size - _HEADER_BYTES) // _row(further).size
+
+
+def _row(further: int) -> struct.Struct:
+    """Return the layout of a row: its number comes first, since that is the first to change."""
+    return struct.Struct(f"{1 + len(FIELDS) + further}d")
 
 
 class Ring:
@@ -55,12 +59,21 @@ class Ring:
     capacity
         Rows kept; the producer may be this far ahead before rows are lost.
     memory
-        Of `size_of(capacity)` bytes, zeros at first; None allocates memory that is not shared.
+        Of `size_of(capacity, len(further))` bytes, zeros at first; None allocates memory that is not shared.
+    further
+        Names of the fields of a row behind `FIELDS`.
     """
 
-    def __init__(self, capacity: int, memory: mmap.mmap | bytearray | None = None) -> None:
-        self.capacity = capacity
-        self.memory = bytearray(size_of(capacity)) if memory is None else memory
+    def __init__(
+        self,
+        capacity: int,
+        memory: mmap.mmap | bytearray | None = None,
+        further: tuple[str, ...] = (),
+    ) -> None:
+        self.capacity, self.further = capacity, further
+        self.memory = bytearray(size_of(capacity, len(further))) if memory is None else memory
+        layout = _row(len(further))
+        self._row_bytes, self._pack = layout.size, layout.pack_into
         self.dropped = 0  # rows overwritten before they were read here
         self.position = 0  # the next row to read
         self._rows = np.frombuffer(self.memory, np.float64, offset=_HEADER_BYTES).reshape(capacity, -1)
@@ -69,14 +82,20 @@ class Ring:
         self._count = memoryview(self.memory)[:8].cast("q")
 
     def push(
-        self, cycle: Cycle, truth: Truth, now: Reference = NO_REFERENCE, began: float = -math.inf
+        self,
+        cycle: Cycle,
+        truth: Truth,
+        now: Reference = NO_REFERENCE,
+        began: float = -math.inf,
+        further: tuple[float, ...] = (),
     ) -> None:
         """Write one row, `now` being the reference at the sample's instant; constant time, never blocks."""
         sample, estimate, reference, demand, voltage, timing = cycle
         k = self._written
-        row = _HEADER_BYTES + k % self.capacity * _ROW_BYTES
-        _pack(
-            self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth, *now, began
+        row = _HEADER_BYTES + k % self.capacity * self._row_bytes
+        self._pack(
+            self.memory, row, k, *sample, *estimate, *reference, demand, voltage, *timing, *truth,
+            *now, began, *further,
         )  # fmt: skip
         self._written = k + 1
         self._count[0] = k + 1
@@ -93,10 +112,15 @@ class Ring:
         return float(self._rows[(written - 1) % self.capacity, 1]) if written else 0.0
 
     def latest(self) -> dict[str, float]:
-        """Return the newest row by `FIELDS`; an empty mapping before the first row."""
+        """Return the newest row by `FIELDS` and further names; an empty mapping before the first row."""
         written = self.written
         row = self._rows[(written - 1) % self.capacity].tolist()
-        return dict(zip(FIELDS, row[1:], strict=True)) if written and row[0] == written - 1 else {}
+        names = (*FIELDS, *self.further)
+        return dict(zip(names, row[1:], strict=True)) if written and row[0] == written - 1 else {}
+
+    def reader(self) -> Ring:
+        """Return a ring over the same memory, which reads from the first row on."""
+        return Ring(self.capacity, self.memory, self.further)
 
     def __len__(self) -> int:
         """Return the number of rows not read yet, including those already overwritten."""
@@ -107,7 +131,7 @@ class Ring:
 
         Returns
         -------
-        ndarray, shape (n, len(FIELDS))
+        ndarray, shape (n, len(FIELDS) + len(further))
             A copy. Rows that the producer overwrote, even during the copy, are left out and counted.
         """
         written = self.written

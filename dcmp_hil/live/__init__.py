@@ -39,7 +39,9 @@ class CommandInterface(Protocol):
         """Descriptor that takes the numbers of signals that ask for the end; -1 before `open`, or without."""
         ...
 
-    def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
+    def open(
+        self, rig: Rig, ring: int | None, warn: Callable[[str], None], further: tuple[str, ...] = ()
+    ) -> None:
         """Start the command process, without waiting until it is ready.
 
         Parameters
@@ -50,6 +52,8 @@ class CommandInterface(Protocol):
             Descriptor of the memory of the ring of periods; None if no other process may see it.
         warn
             Called, from any thread, if the command process no longer listens.
+        further
+            Names of the further fields of a row of the ring.
         """
         ...
 

@@ -74,7 +74,9 @@ class CommandProcess:
         """Descriptor of the mailbox's memory."""
         return self._file
 
-    def open(self, rig: Rig, ring: int | None, warn: Callable[[str], None]) -> None:
+    def open(
+        self, rig: Rig, ring: int | None, warn: Callable[[str], None], further: tuple[str, ...] = ()
+    ) -> None:
         """Start it; it comes up by itself, in about half a second. See `CommandInterface`."""
         if ring is None:
             return
@@ -82,7 +84,7 @@ class CommandProcess:
         try:
             child = ChildProcess(
                 _SERVER_MODULE,
-                CommandSetup(rig, self._file, ring, self._listen, self._source),
+                CommandSetup(rig, self._file, ring, self._listen, self._source, further),
                 shared=[self._file, ring],
                 blocked=SIGNALS,  # until it has handlers of its own
             )

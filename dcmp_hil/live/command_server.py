@@ -64,6 +64,8 @@ class CommandSetup:
         Whether others may change the run; STOP by a signal is seen to in any case.
     source
         The rig's file, an absolute path, or the name of a shipped rig; empty if it has neither.
+    further
+        Names of the further fields of a row of the ring.
     """
 
     rig: Rig
@@ -71,6 +73,7 @@ class CommandSetup:
     ring: int
     listen: bool = True
     source: str = ""
+    further: tuple[str, ...] = ()
 
 
 class Server:
@@ -93,7 +96,8 @@ class Server:
         self._parent = parent
         self._mailbox = mailbox
         size = os.fstat(setup.ring).st_size
-        self._ring = Ring(capacity_of(size), mapped(setup.ring, size))
+        capacity = capacity_of(size, len(setup.further))
+        self._ring = Ring(capacity, mapped(setup.ring, size), setup.further)
         self._one_at_a_time = asyncio.Lock()
         self._clock = MonotonicClock()
         self._written, self._newest_ns = 0, self._clock.now_ns()

@@ -92,7 +92,7 @@ class Envelopes:
         self.late = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Add cycles, oldest first, shape (n, len(FIELDS)) as `Ring.drain` gives them."""
+        """Add cycles, oldest first, shape (n, len(FIELDS) or more) as `Ring.drain` gives them."""
         rows = rows[np.isfinite(rows[:, 0])]
         if not len(rows):
             return

@@ -51,7 +51,7 @@ class OrderedContents(NamedTuple):
     Parameters
     ----------
     rows
-        Shape (n, len(FIELDS)).
+        Shape (n, len(FIELDS) or more).
     events
         In order.
     gaps

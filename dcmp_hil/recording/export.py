@@ -12,7 +12,7 @@ import numpy as np
 
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.block import Block
+from dcmp_hil.telemetry.further_columns import begin
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
 from dcmp_hil.values import Event
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.recording.reexecute import Reexecution
+    from dcmp_hil.telemetry.block import Block
 
 _ROW_GROUP_ROWS = 1 << 16  # rows of a row group
 _REPLAYED_COLUMNS = (  # what a replay says a second time
@@ -39,7 +40,7 @@ def to_csv(run: RecordedRun, path: Path) -> None:
     """Write every signal, one row a cycle; numbers come back to the bit."""
     with _writing(path) as place, place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(names())
+        writer.writerow(names(run.further))
         for block in run.blocks():
             _write_rows(writer, columns(block).values())
 
@@ -49,7 +50,7 @@ def to_parquet(run: RecordedRun, path: Path) -> None:
     pyarrow: Any = import_module("pyarrow")  # neither has types
     parquet: Any = import_module("pyarrow.parquet")
     said = {**run.run, "complete": str(run.complete).lower(), "missing": json.dumps(run.gaps)}
-    schema = pyarrow.schema([(name, pyarrow.float64()) for name in names()], metadata=said)
+    schema = pyarrow.schema([(name, pyarrow.float64()) for name in names(run.further)], metadata=said)
     with (
         _writing(path) as place,
         place.open("wb") as file,  # given a path, pyarrow removes it where it cannot write
@@ -65,6 +66,7 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
 
     with _writing(path) as place:
         sink = RerunSink(view_of(run.rig), place, "none")
+        begin(sink, run.further)
         for part in _in_order(run):
             if isinstance(part, Event):
                 sink.event(part)
@@ -81,11 +83,11 @@ def _in_order(run: RecordedRun) -> Iterator[Block | Event]:
         while events and events[0].t <= block["t"][-1]:
             end = int(np.searchsorted(block["t"], events[0].t))
             if end > first:
-                yield Block(block.rows[first:end], block.model)
+                yield block.with_rows(block.rows[first:end])
                 first = end
             yield events.pop(0)
         if first < len(block):
-            yield Block(block.rows[first:], block.model)
+            yield block.with_rows(block.rows[first:])
     yield from events
 
 

@@ -9,27 +9,20 @@ import numpy as np
 
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.recording.mcap_records import HEAD, KNOWN_OPCODES, Op, RecordError, channel_in, schema_in
-from dcmp_hil.recording.schema import CYCLE_SCHEMA, CYCLES, EVENTS
+from dcmp_hil.recording.schema import CYCLES, EVENTS, further_in
+from dcmp_hil.telemetry.further_columns import FURTHER_MAX
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
 _MESSAGE = struct.Struct("<HIQQ")
-_CDR_HEADER_BYTES = 4  # bytes in front of the numbers
-_PERIOD = np.dtype(
-    [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-        ("header", "<u4"),
-        ("row", "<f8", (len(FIELDS),)),
-    ]
-)
-_PERIOD_LENGTH = _PERIOD.itemsize - HEAD.size
+_NUMBER_BYTES = 8
+_BEFORE_ROW: list[tuple[str, str]] = [
+    *(("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8")),
+    *(("publish_time", "<u8"), ("header", "<u4")),
+]
+_BEFORE_ROW_BYTES = np.dtype(_BEFORE_ROW).itemsize
 _CDR_HEADER = 0x00000100  # of CDR, little endian, as a number
 RUN_TIME_MAX_S = 1e9
 """s; a device time beyond it has the beginning's time in the log."""
@@ -46,6 +39,8 @@ class Messages:
         What was left out and why, each sentence once.
     events
         Sequence number, time of the log (ns) and text of each; the number is 0 in format 1.
+    further
+        Names of the columns behind `FIELDS`; None where the block with the schema is not there.
     """
 
     def __init__(self) -> None:
@@ -57,6 +52,9 @@ class Messages:
         self._rows = bytearray()
         self.events: list[tuple[int, int, bytes]] = []
         self.faults: dict[str, None] = {}
+        self.further: tuple[str, ...] | None = None
+        self._period = np.dtype([*_BEFORE_ROW, ("row", "<f8", (len(FIELDS),))])
+        self._width_known = False  # by a schema, or by the first cycle of a file that lost it
 
     @property
     def sequence(self) -> NDArray[np.uint32]:
@@ -70,8 +68,8 @@ class Messages:
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """Every cycle, shape (n, len(FIELDS)); this memory is the collector's own."""
-        return np.frombuffer(self._rows, "<f8").reshape(-1, len(FIELDS))
+        """Every cycle, shape (n, len(FIELDS) or more); this memory is the collector's own."""
+        return np.frombuffer(self._rows, "<f8").reshape(-1, self._width)
 
     def channel_of(self, topic: str) -> int:
         """Return the number of a topic's channel; 0 if there is none."""
@@ -89,8 +87,8 @@ class Messages:
             if length > end - start or opcode not in KNOWN_OPCODES:
                 self._fault("a block ends inside a record")
                 return
-            if opcode == Op.MESSAGE and length == _PERIOD_LENGTH and (count := self._periods(data, at)):
-                at += count * _PERIOD.itemsize
+            if opcode == Op.MESSAGE and (count := self._periods(data, at, length)):
+                at += count * self._period.itemsize
                 continue
             try:
                 self._one(opcode, data[start : start + length])
@@ -98,12 +96,15 @@ class Messages:
                 self._fault(f"a record in a block cannot be read: {error}")
             at = start + length
 
-    def _periods(self, data: bytes, at: int) -> int:
-        """Process the consecutive cycles from `at`; return their number."""
-        found = np.frombuffer(data, _PERIOD, (len(data) - at) // _PERIOD.itemsize, at)
+    def _periods(self, data: bytes, at: int, length: int) -> int:
+        """Process the consecutive cycles from `at`, the first of that length; return their number."""
+        period = self._period_of(data, at, length)
+        if period.itemsize != HEAD.size + length:
+            return 0
+        found = np.frombuffer(data, period, (len(data) - at) // period.itemsize, at)
         same = (
             (found["opcode"] == Op.MESSAGE)
-            & (found["length"] == _PERIOD_LENGTH)
+            & (found["length"] == length)
             & (found["channel"] == self.channel_of(CYCLES))
             & (found["header"] == _CDR_HEADER)
         )
@@ -113,6 +114,27 @@ class Messages:
         self._log_time += found["log_time"].tobytes()
         self._rows += found["row"].tobytes()
         return count
+
+    @property
+    def _width(self) -> int:
+        """Numbers of a cycle."""
+        return int(self._period["row"].shape[0])
+
+    def _period_of(self, data: bytes, at: int, length: int) -> np.dtype[np.void]:
+        """Return the layout of a cycle; where its schema is lost, the first cycle says how long one is."""
+        if not self._width_known and length >= _MESSAGE.size:
+            (channel,) = struct.unpack_from("<H", data, at + HEAD.size)
+            numbers, rest = divmod(HEAD.size + length - _BEFORE_ROW_BYTES, _NUMBER_BYTES)
+            if channel == self.channel_of(CYCLES) and not rest:
+                self._declare(numbers)
+        return self._period
+
+    def _declare(self, width: int) -> bool:
+        """Take the number of columns, once; return whether it is the same as before."""
+        if not self._width_known and len(FIELDS) <= width <= len(FIELDS) + FURTHER_MAX:
+            self._width_known = True
+            self._period = np.dtype([*_BEFORE_ROW, ("row", "<f8", (width,))])
+        return width == self._width
 
     def _one(self, opcode: int, content: bytes) -> None:
         if opcode == Op.SCHEMA:
@@ -145,13 +167,21 @@ class Messages:
             return
         if twice:
             self._fault(f"there are two channels {topic}")
-        elif topic == CYCLES and said[1] != CYCLE_SCHEMA:
+        elif topic == CYCLES and not self._columns(said[1]):
             self._topics = {one: name for one, name in self._topics.items() if name != topic}
             self._fault("its periods have other columns than those of this version")
         else:
             self._topics = {one: name for one, name in self._topics.items() if name != topic} | {
                 number: topic
             }
+
+    def _columns(self, schema: bytes) -> bool:
+        """Take the columns of the cycles; return whether this version knows them."""
+        further = further_in(schema)
+        if further is None or not self._declare(len(FIELDS) + len(further)):
+            return False
+        self.further = further
+        return True
 
     def _event(self, sequence: int, log_time: int, text: bytes) -> None:
         if len(self.events) >= _EVENTS_MAX:

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
 import stat
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from dcmp_hil.common.printable_text import readable
 from dcmp_hil.config import Rig
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.recording.deduplication import Gap, in_order
+from dcmp_hil.recording.file_contents import FileContents
 from dcmp_hil.recording.format_1 import event_of_format_1
-from dcmp_hil.recording.mcap_records import Op, RecordError, counts_in, metadata_in
-from dcmp_hil.recording.mcap_scanner import Damage, Scanner, attachment_of
-from dcmp_hil.recording.messages import Messages
-from dcmp_hil.recording.schema import ABOUT, CYCLES, END, EVENTS, FORMAT, FORMAT_1, RIG, RUN, event_from
+from dcmp_hil.recording.mcap_scanner import Damage, Scanner
+from dcmp_hil.recording.schema import FORMAT_1, RIG, event_from
 from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.signals import columns
 
@@ -30,11 +27,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dcmp_hil.recording.mcap_scanner import Record
     from dcmp_hil.values import Event
 
 _SENTENCES_MAX = 20  # sentences
-_TEXT_CHARS_MAX = 10_000  # characters of what is said of a run
 _UNCHECKED_NOTE = (
     "it has the older layout: what it says of its run (version, note, faults) is under no checksum, and "
     "whether an event is missing is known only where the file ended properly"
@@ -54,7 +49,7 @@ class RecordedRun:
     run
         What is known of the run: version, protocol, host, note.
     rows
-        Every cycle that is there and right, shape (n, len(FIELDS)), as it was in the ring.
+        Every cycle that is there and right, shape (n, len(FIELDS) + len(further)), as it was in the ring.
     events
         What happened, in order.
     complete
@@ -65,6 +60,8 @@ class RecordedRun:
         What is wrong with the file, a sentence each; empty where nothing is.
     unchecked
         What this layout has no checksum for, a sentence each.
+    further
+        Names of the columns of a row behind `FIELDS`.
     """
 
     path: Path
@@ -76,11 +73,12 @@ class RecordedRun:
     gaps: tuple[Gap, ...] = ()
     damage: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
+    further: tuple[str, ...] = ()
 
     @property
     def block(self) -> Block:
         """Return all periods as one block."""
-        return Block(self.rows, self.rig.model.values())
+        return Block(self.rows, self.rig.model.values(), self.further)
 
     @property
     def columns(self) -> dict[str, NDArray[np.float64]]:
@@ -89,9 +87,9 @@ class RecordedRun:
 
     def blocks(self, rows: int = 4096) -> Iterator[Block]:
         """Yield the periods in blocks of so many rows at most."""
-        model = self.rig.model.values()
+        whole = self.block
         for first in range(0, len(self.rows), rows):
-            yield Block(self.rows[first : first + rows], model)
+            yield whole.with_rows(self.rows[first : first + rows])
 
 
 def recording_in(path: Path) -> Path:
@@ -129,7 +127,7 @@ def _opened(path: str, flags: int) -> int:
 
 
 def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
-    found = _FileContents()
+    found = FileContents()
     scanner = Scanner(file, size)
     for piece in scanner:
         if isinstance(piece, Damage):
@@ -142,18 +140,19 @@ def _read(path: Path, file: IO[bytes], size: int) -> RecordedRun:
     periods, events = found.totals()
     event_of = event_of_format_1 if older else event_from
     ordered = in_order(found.messages, found.began_ns, periods, events, event_of)
+    rows, further = found.columns(ordered.rows)
     damage = _told(found, scanner, (*found.faults, *found.messages.faults, *ordered.faults), ordered.gaps)
     unchecked = (_UNCHECKED_NOTE,) if older else ()
     complete = not damage and not unchecked and scanner.closed and scanner.data_checked is True
     if not complete and not damage and not unchecked:
         damage = ("it has no checksum over all of it: another program wrote it",)
     return RecordedRun(
-        path, rig, run, ordered.rows, ordered.events, complete, ordered.gaps, damage, unchecked
+        path, rig, run, rows, ordered.events, complete, ordered.gaps, damage, unchecked, further
     )
 
 
 def _told(
-    found: _FileContents, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[Gap, ...]
+    found: FileContents, scanner: Scanner, faults: tuple[str, ...], gaps: tuple[Gap, ...]
 ) -> tuple[str, ...]:
     """Return what is wrong, a sentence each, the time spans first."""
     told = [str(gap) for gap in gaps]
@@ -170,7 +169,7 @@ def _told(
     return (*told[:_SENTENCES_MAX], f"and {more} more of the kind") if more > 0 else tuple(told)
 
 
-def _rig(path: Path, found: _FileContents, run: dict[str, str]) -> Rig:
+def _rig(path: Path, found: FileContents, run: dict[str, str]) -> Rig:
     """Return the rig, which finds its classes where the run did as long as both lie as they lay then."""
     table = found.attached(RIG)
     if not isinstance(table, dict):
@@ -187,101 +186,3 @@ def _rig(path: Path, found: _FileContents, run: dict[str, str]) -> Rig:
     except (RecursionError, ArithmeticError, MemoryError):
         raise ConfigError(f"{path}: its rig is none.") from None
     return rig.in_folder(path.parent / run["rig_folder"]) if "rig_folder" in run else rig
-
-
-class _FileContents:
-    """Contents of a recording's file, before they are put in order."""
-
-    def __init__(self) -> None:
-        self.messages = Messages()
-        self.damage: list[Damage] = []
-        self.faults: list[str] = []
-        self.began_ns = 0
-        self._attached: dict[str, bytes] = {}
-        self._run: dict[str, str] | None = None
-        self._said_counts: dict[int, int] | None = None  # of a summary that was not checked yet
-        self._counts: dict[int, int] | None = None
-
-    def take(self, record: Record, *, summary_checked: bool) -> None:
-        """Process a record, in the order of the file; the footer says whether its summary was checked."""
-        try:
-            if record.opcode == Op.CHUNK:
-                self.messages.take(record.content)
-            elif record.opcode == Op.ATTACHMENT:
-                self._attach(record)
-            elif record.opcode == Op.METADATA:
-                self._describe(record)
-            elif record.opcode == Op.STATISTICS:
-                self._said_counts = counts_in(record.content)
-            elif record.opcode == Op.FOOTER:
-                self._counts = self._counts or (self._said_counts if summary_checked else None)
-            elif record.opcode == Op.MESSAGE:
-                self._fault("messages outside of blocks are left out: no checksum covers them")
-        except RecordError as error:
-            self._fault(f"a record cannot be read: {error}")
-
-    def attached(self, name: str) -> Any:
-        """Return an attached document; None if there is none that can be read."""
-        try:
-            return json.loads(self._attached[name])
-        except (KeyError, ValueError, RecursionError):
-            return None
-
-    def about(self, path: Path) -> dict[str, str]:
-        """Return what is said of the run, from under a checksum where there is one.
-
-        Raises
-        ------
-        ConfigError
-            If nothing is, or a version is that this one does not read.
-        """
-        said = self.attached(ABOUT)
-        if not isinstance(said, dict):
-            said = self._run
-            if said is not None and said.get("format") == FORMAT:
-                self._fault("what it says of its run (version, note, faults) is left as it is, unchecked")
-        if said is None and RIG in self._attached:
-            self._fault("what it says of its run (version, note, faults) is lost")
-            said = {"format": FORMAT_1}
-        if said is None:
-            raise ConfigError(f"{path}: this is no recording of dcmp-hil, or its very beginning is missing.")
-        run = {
-            readable(str(key))[:_TEXT_CHARS_MAX]: readable(str(text))[:_TEXT_CHARS_MAX]
-            for key, text in said.items()
-        }
-        if run.get("format") not in {FORMAT, FORMAT_1}:
-            raise ConfigError(
-                f"{path}: a recording of format {run.get('format', 'unknown'):.20}; this version reads "
-                f"{FORMAT}. Use dcmp-hil {run.get('version', 'of that time'):.40}."
-            )
-        return run
-
-    def totals(self) -> tuple[int | None, int | None]:
-        """Return how many periods and events there were; None where nothing that was checked says it."""
-        end = self.attached(END)
-        if isinstance(end, dict) and all(isinstance(end.get(key), int) for key in ("periods", "events")):
-            return end["periods"], end["events"]
-        if self._counts is not None:
-            channels = self.messages.channel_of(CYCLES), self.messages.channel_of(EVENTS)
-            periods, events = (self._counts.get(channel, 0) for channel in channels)
-            return periods, events
-        return None, None
-
-    def _describe(self, record: Record) -> None:
-        name, entries = metadata_in(record.content)
-        if name == RUN and self._run is None:
-            self._run = entries
-
-    def _attach(self, record: Record) -> None:
-        attachment = attachment_of(record)
-        if attachment.name not in {ABOUT, RIG, END}:
-            return
-        self.began_ns = self.began_ns or attachment.log_time
-        if attachment.log_time != self.began_ns:
-            self._fault(f"{attachment.name} of another run is in it")
-        elif self._attached.setdefault(attachment.name, attachment.data) != attachment.data:
-            self._fault(f"two {attachment.name} in it differ; the first one counts")
-
-    def _fault(self, sentence: str) -> None:
-        if sentence not in self.faults:
-            self.faults.append(sentence)

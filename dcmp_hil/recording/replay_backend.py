@@ -37,7 +37,7 @@ class ReplayBackend:
     Parameters
     ----------
     rows
-        Shape (n, len(FIELDS)), as `RecordedRun.rows`.
+        Shape (n, len(FIELDS) or more), as `RecordedRun.rows`.
 
     Attributes
     ----------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter
 
 from dcmp_hil.common.printable_text import readable
-from dcmp_hil.ipc.ring import FIELDS
+from dcmp_hil.telemetry.further_columns import CHANNEL_NAMES, FURTHER_MAX, fault_of
 from dcmp_hil.values import DATA, OPTIONAL_DATA, Event, EventKind, Level
 
 if TYPE_CHECKING:
@@ -22,29 +22,17 @@ FORMAT, FORMAT_1 = "2", "1"
 """Of what is said about a run; a number that this version does not know is refused. In format 1 an event had
 no kind, no data (see `recording.format_1`) and no number, and what is said of a run was under no checksum."""
 CYCLES, EVENTS = "/cycles", "/events"
-RUN, ABOUT, RIG, END = "run", "run.json", "rig.json", "end.json"
+RUN, ABOUT, RIG, END, FURTHER = "run", "run.json", "rig.json", "end.json", "further_columns.json"
 """Names of the metadata that say what the run was; of the attachments that say it under a checksum, of the
-rig, and of what is known at the end."""
+rig, of what is known at the end, and of the names of the further columns, if it has any."""
 
-_UNITS = {
-    "t": "s", "began": "s", "period": "s", "lateness": "s", "compute": "s", "fault": "",
-    "position": "rad", "velocity": "rad_s", "acceleration": "rad_s2", "disturbance": "rad_s2", "voltage": "v",
-}  # fmt: skip
 _HEADER = b"\0\1\0\0"  # of CDR: little endian
 _LEVELS: dict[Level, int] = {"DEBUG": 1, "INFO": 2, "WARN": 3, "ERROR": 4}  # of foxglove.Log
 _FROM_LEVELS = {number: level for level, number in _LEVELS.items()}
 _TEXT_CHARS_MAX = 10_000  # characters
 _ADAPTERS = {kind: TypeAdapter(data) for kind, data in DATA.items()}
-
-
-def _with_unit(field: str) -> str:
-    """Return a field's name as a ROS message may have it: lower case, and its unit at the end."""
-    unit = _UNITS[field.partition("_")[0]]
-    return f"{field}_{unit}" if unit else field
-
-
-CHANNEL_NAMES = tuple(_with_unit(field) for field in FIELDS)
-CYCLE_SCHEMA = "\n".join(f"float64 {name}" for name in CHANNEL_NAMES).encode()
+_TYPE = "float64"
+CYCLE_SCHEMA = "\n".join(f"{_TYPE} {name}" for name in CHANNEL_NAMES).encode()
 EVENT_SCHEMA = json.dumps(
     {
         "title": "foxglove.Log",
@@ -64,8 +52,24 @@ EVENT_SCHEMA = json.dumps(
 ).encode()
 
 
+def cycle_schema(further: tuple[str, ...] = ()) -> bytes:
+    """Return the schema of a cycle with these further columns; a ROS name has no capital letter."""
+    return b"\n".join((CYCLE_SCHEMA, *(f"{_TYPE} {name.lower()}".encode() for name in further)))
+
+
+def further_in(schema: bytes) -> tuple[str, ...] | None:
+    """Return the further columns of a schema; None if it is not that of a cycle of this version."""
+    known, *lines = schema[len(CYCLE_SCHEMA) :].split(b"\n", FURTHER_MAX + 1)
+    if not schema.startswith(CYCLE_SCHEMA) or known or len(lines) > FURTHER_MAX:
+        return None
+    words = [line.decode("ascii", "replace").partition(" ") for line in lines]
+    further = tuple(f"{name[:-1]}V" if name.endswith("_v") else name for _, _, name in words)
+    sound = all(kind == _TYPE for kind, _, _ in words) and not fault_of(further)
+    return further if sound and cycle_schema(further) == schema else None
+
+
 def to_bytes(rows: NDArray[np.float64]) -> list[bytes]:
-    """Return each row, shape (n, len(FIELDS)), as a CDR message: NaN and infinity survive."""
+    """Return each row of a block as a CDR message: NaN and infinity survive."""
     return [_HEADER + row.tobytes() for row in rows.astype("<f8", copy=False)]
 
 

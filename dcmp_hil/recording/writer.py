@@ -17,22 +17,23 @@ from dcmp_hil.recording.mcap_records import MAGIC
 from dcmp_hil.recording.messages import log_times
 from dcmp_hil.recording.schema import (
     ABOUT,
-    CYCLE_SCHEMA,
     CYCLES,
     END,
     EVENT_SCHEMA,
     EVENTS,
+    FURTHER,
     LIBRARY,
     PROFILE,
     RIG,
     RUN,
+    cycle_schema,
     event_to_bytes,
     to_bytes,
 )
 from dcmp_hil.recording.write_buffer import WriteBuffer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
     from typing import IO
 
@@ -93,7 +94,9 @@ class RecordingSink:
         self._dropped_told = 0
         self._cut_at = 0  # number of the last cycle in a piece
         self._t = self._cut_t = 0.0  # s, device time of the newest, and of the last in a piece
-        self._attached = ((ABOUT, json.dumps(dict(run)).encode()), (RIG, rig.encode()))
+        self._attached = [(ABOUT, json.dumps(dict(run)).encode()), (RIG, rig.encode())]
+        self._further: tuple[str, ...] | None = None  # not known yet
+        self._cycles = self._events = 0  # numbers of the channels
         self.warnings: list[str] = []
         try:
             self._file = open_file(path)
@@ -105,15 +108,7 @@ class RecordingSink:
             )
             self._writer.start(profile=PROFILE, library=LIBRARY)
             self._writer.add_metadata(RUN, dict(run))
-            self._attach()
-            cycle = self._writer.register_schema("dcmp_hil/msg/Cycle", "ros2msg", CYCLE_SCHEMA)
-            log = self._writer.register_schema("foxglove.Log", "jsonschema", EVENT_SCHEMA)
-            self._cycles = self._writer.register_channel(CYCLES, "cdr", cycle)
-            self._events = self._writer.register_channel(EVENTS, "json", log)
-            # Its list of objects would take a megabyte a minute for as long as the run goes on.
-            self._writer._Writer__chunk_indices = ChunkIndices(  # type: ignore[attr-defined]  # noqa: SLF001
-                (self._cycles, self._events)
-            )
+            self._attach(self._attached)
             self._file.cut(0.0, 0.0, 1, 0)
             began, reason = self._file.put(), self._file.refused
         except OSError as error:
@@ -124,8 +119,41 @@ class RecordingSink:
                 "left, or use --no-record."
             )
 
+    def begin(self, further: tuple[str, ...]) -> None:
+        """Say what columns a cycle has, before the first of them and before any event.
+
+        Parameters
+        ----------
+        further
+            Names of those that not every run has. Without this call they are those of the first block, or
+            none if an event comes before it.
+        """
+        if self._further is not None:
+            return
+        self._further = further
+        if further:  # under a checksum of its own: the schema is in the first block alone
+            self._attached.append((FURTHER, json.dumps(further).encode()))
+            self._attach(self._attached[-1:])
+        cycle = self._writer.register_schema("dcmp_hil/msg/Cycle", "ros2msg", cycle_schema(further))
+        log = self._writer.register_schema("foxglove.Log", "jsonschema", EVENT_SCHEMA)
+        self._cycles = self._writer.register_channel(CYCLES, "cdr", cycle)
+        self._events = self._writer.register_channel(EVENTS, "json", log)
+        # Its list of objects would take a megabyte a minute for as long as the run goes on.
+        self._writer._Writer__chunk_indices = ChunkIndices(  # noqa: SLF001
+            (self._cycles, self._events)
+        )
+
     def block(self, block: Block) -> None:
-        """Process a block of consecutive cycles."""
+        """Process a block of consecutive cycles.
+
+        Raises
+        ------
+        RuntimeError
+            If it has other columns than the ones before.
+        """
+        self.begin(block.further)
+        if block.further != self._further:
+            raise RuntimeError("A block has other columns than the recording.")
         times = block["t"]
         at_ns = log_times(times, self._began_ns).tolist()
         for t, data, at in zip(times.tolist(), to_bytes(block.rows), at_ns, strict=True):
@@ -137,6 +165,7 @@ class RecordingSink:
 
     def event(self, event: Event) -> None:
         """Process an event."""
+        self.begin(())
         at = int(log_times(np.array([event.t]), self._began_ns)[0])
         self._event += 1
         self._writer.add_message(self._events, at, event_to_bytes(event, at), at, self._event)
@@ -151,6 +180,7 @@ class RecordingSink:
         RuntimeError
             If the end of the run is not in the file.
         """
+        self.begin(())
         self._writer.flush()
         self._cut()
         self._file.put()
@@ -160,7 +190,7 @@ class RecordingSink:
             "events": self._event,
             "missing": _joined(lost)[:_LOST_STRETCHES_MAX],
         }
-        self._attach()
+        self._attach(self._attached)
         self._writer.add_attachment(
             self._began_ns, self._began_ns, END, "application/json", json.dumps(document).encode()
         )
@@ -177,8 +207,8 @@ class RecordingSink:
                 f"{self._path} is incomplete: {self._file.refused}. Its end is missing; free some space."
             )
 
-    def _attach(self) -> None:
-        for name, data in self._attached:
+    def _attach(self, documents: Sequence[tuple[str, bytes]]) -> None:
+        for name, data in documents:
             self._writer.add_attachment(self._began_ns, self._began_ns, name, "application/json", data)
 
     def _end_without_index(self) -> None:

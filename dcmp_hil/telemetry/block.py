@@ -29,21 +29,32 @@ class Block:
     Parameters
     ----------
     rows
-        Shape (n, len(FIELDS)), as `Ring.drain` gives them.
+        Shape (n, len(FIELDS) + len(further)), as `Ring.drain` gives them.
     model
         What the host believes of the plant.
+    further
+        Names of the columns behind `FIELDS`.
     """
 
-    def __init__(self, rows: NDArray[np.float64], model: Model = UNKNOWN_MODEL) -> None:
-        self.rows, self.model = rows, model
+    def __init__(
+        self, rows: NDArray[np.float64], model: Model = UNKNOWN_MODEL, further: tuple[str, ...] = ()
+    ) -> None:
+        self.rows, self.model, self.further = rows, model, further
+
+    def with_rows(self, rows: NDArray[np.float64]) -> Block:
+        """Return a block of other cycles of the same run."""
+        return Block(rows, self.model, self.further)
 
     def __len__(self) -> int:
         """Count the periods."""
         return len(self.rows)
 
     def __getitem__(self, field: str) -> NDArray[np.float64]:
-        """Return one column of `FIELDS`, shape (n,), SI units."""
-        column: NDArray[np.float64] = self.rows[:, _COLUMN[field]]
+        """Return one column of `FIELDS`, or a further one, shape (n,), SI units."""
+        number = _COLUMN.get(field)
+        if number is None:
+            number = len(FIELDS) + self.further.index(field)
+        column: NDArray[np.float64] = self.rows[:, number]
         return column
 
     @property

@@ -75,7 +75,7 @@ class SinkDispatcher:
         self._dispatch_events()
         rows = self.ring.drain()
         if len(rows):
-            block = Block(rows, self._model)
+            block = Block(rows, self._model, self.ring.further)
             self._tell(lambda sink: sink.block(block))
         self._report_warnings()
 

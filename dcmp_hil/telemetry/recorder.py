@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.ipc.ring import Ring
 from dcmp_hil.telemetry.dispatcher import DispatchThread, Sink, SinkDispatcher
+from dcmp_hil.telemetry.further_columns import NO_FURTHER_COLUMNS
 from dcmp_hil.telemetry.link_events import LinkWatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.control.model import Model
+    from dcmp_hil.errors import TripError
     from dcmp_hil.telemetry.block import ReferenceAligner
+    from dcmp_hil.telemetry.further_columns import FurtherColumns
     from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
     from dcmp_hil.values import Cycle, Event, Truth
 
@@ -48,6 +51,17 @@ class Recorder:
         What the host believes of the plant.
     backend
         Whose counters are told of once a second, if it has a wire.
+    further
+        Further columns of each cycle.
+
+    Attributes
+    ----------
+    recent
+        The last cycles.
+    recent_further
+        Their further columns.
+    further
+        Names of those.
     """
 
     def __init__(
@@ -61,16 +75,20 @@ class Recorder:
         apart: TelemetryProcess | None = None,
         model: Model = UNKNOWN_MODEL,
         backend: object = None,
+        further: FurtherColumns = NO_FURTHER_COLUMNS,
     ) -> None:
         self.recent: deque[Cycle] = deque(maxlen=recent)
+        self.recent_further: deque[tuple[float, ...]] = deque(maxlen=recent)
+        self.further = further.names
         self._apart = apart
-        self._ring = apart.ring if apart else Ring(_SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY_ROWS)
+        capacity = _SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY_ROWS
+        self._ring = apart.ring if apart else Ring(capacity, further=further.names)
+        self._source = further
+        self._further = further.values if further.names else None
         self._push = self._ring.push
         self._truth = truth
         self._now = aligner.now
-        self._audience = SinkDispatcher(
-            Ring(self._ring.capacity, self._ring.memory), sinks, self.event, model
-        )
+        self._audience = SinkDispatcher(self._ring.reader(), sinks, self.event, model)
         self.link = LinkWatch(backend, 1, self.event)
         self._look_at_link = self.link.look
         self._every = self._left = min(
@@ -85,12 +103,18 @@ class Recorder:
         sample, _, reference, _, _, _ = cycle
         t = sample.t
         now, began = self._now(t, reference)
-        self._push(cycle, self._truth(), now, began)
+        if self._further is None:
+            self._push(cycle, self._truth(), now, began)
+        else:
+            further = self._further(cycle)
+            self._push(cycle, self._truth(), now, began, further)
+            self.recent_further.append(further)
         self.recent.append(cycle)
         self._left -= 1
         if not self._left:
             self._left = self._every
             self._look_at_link(t)
+            self._tell_further()
             if self._in_line:
                 self._audience.dispatch()
 
@@ -99,6 +123,20 @@ class Recorder:
         self._audience.event(event)
         if self._apart:
             self._apart.event(event)
+
+    def fill(self, trip: TripError) -> None:
+        """Give a trip the last second of cycles."""
+        trip.cycles = tuple(self.recent)
+        trip.further, trip.further_values = self.further, tuple(self.recent_further)
+
+    def tell_rest(self) -> None:
+        """Report what link and further columns have not told yet: the run has ended."""
+        self.link.finish(self.t)
+        self._tell_further()
+
+    def _tell_further(self) -> None:
+        for event in self._source.events():
+            self.event(event)
 
     @property
     def t(self) -> float:

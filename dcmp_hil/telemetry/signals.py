@@ -113,8 +113,15 @@ SIGNALS = (
 
 
 def columns(block: Block) -> dict[str, NDArray[np.float64]]:
-    """Read every signal of the table from `block`: column name to shape (n,); `time_s` comes first."""
-    return {"time_s": block["t"], **{signal.column: signal.read(block) for signal in SIGNALS}}
+    """Read every signal of the table from `block`, and its further columns behind them.
+
+    Returns
+    -------
+    dict
+        Column name to shape (n,); `time_s` comes first.
+    """
+    further = {name: block[name] for name in block.further}
+    return {"time_s": block["t"], **{signal.column: signal.read(block) for signal in SIGNALS}, **further}
 
 
 def by_plot() -> dict[str, list[Signal]]:
@@ -125,6 +132,6 @@ def by_plot() -> dict[str, list[Signal]]:
     return plots
 
 
-def names() -> tuple[str, ...]:
-    """Return the names of the columns, in their order."""
-    return ("time_s", *(signal.column for signal in SIGNALS))
+def names(further: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the names of the columns in their order, of a run with these further ones."""
+    return ("time_s", *(signal.column for signal in SIGNALS), *further)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 from dcmp_hil.telemetry.dispatcher import Sink
+from dcmp_hil.telemetry.further_columns import begin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,8 +39,13 @@ class Deferred:
         warnings: Sequence[str] = getattr(self._sink, "warnings", self._missing)
         return warnings
 
-    def make(self) -> None:
+    def make(self, further: tuple[str, ...] = ()) -> None:
         """Make the sink; blocks and events before this call are ignored.
+
+        Parameters
+        ----------
+        further
+            Names of the further columns.
 
         Raises
         ------
@@ -48,6 +54,7 @@ class Deferred:
         """
         try:
             self._sink = self._maker()
+            begin(self._sink, further)
         except ImportError as error:  # a viewer's library that this system lacks ends no run
             self._missing = (f"A sink could not be made, the run goes on without it: {error}",)
 

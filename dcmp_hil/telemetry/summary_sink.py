@@ -83,10 +83,15 @@ class SharedMemorySink:
         For columns and for events, from `reserve`.
     lengths
         What is in them already.
+    further
+        Names of the run's further columns.
     """
 
-    def __init__(self, files: tuple[int, int], lengths: Lengths | None = None) -> None:
+    def __init__(
+        self, files: tuple[int, int], lengths: Lengths | None = None, further: tuple[str, ...] = ()
+    ) -> None:
         lengths = lengths or Lengths()
+        self._names = names(further)
         self._columns, self._events = Log(files[0], lengths.columns), Log(files[1], lengths.events)
 
     @property
@@ -108,8 +113,8 @@ class SharedMemorySink:
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Return every signal, shape (periods,), by column name."""
-        table = np.frombuffer(self._columns.read(), np.float64).reshape(-1, len(names()))
-        return {name: table[:, k].copy() for k, name in enumerate(names())} if len(table) else {}
+        table = np.frombuffer(self._columns.read(), np.float64).reshape(-1, len(self._names))
+        return {name: table[:, k].copy() for k, name in enumerate(self._names)} if len(table) else {}
 
     @property
     def events(self) -> list[Event]:

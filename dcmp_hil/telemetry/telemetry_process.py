@@ -77,6 +77,8 @@ class TelemetryProcess:
         Descriptor of the memory in which the run says how it ended.
     speed
         How many times faster than real time the rows come: a soak has hours of them in minutes.
+    further
+        Names of the further fields of a row.
 
     Attributes
     ----------
@@ -103,6 +105,7 @@ class TelemetryProcess:
         unattended: bytes = b"",
         mailbox: int | None = None,
         speed: float = 1.0,
+        further: tuple[str, ...] = (),
     ) -> None:
         self._files = [reserve(self, what) for what in ("ring", "ledger", "columns", "events")]
         ring, ledger, *kept = self._files
@@ -114,8 +117,8 @@ class TelemetryProcess:
         self._untold: deque[Event] = deque(maxlen=_EVENTS_MAX)
         self._events = 0  # told or not
         self._child: ChildProcess | None = None
-        self.ring = Ring(_CAPACITY_ROWS, mapped(ring, size_of(_CAPACITY_ROWS)))
-        self.figures = SummarySink(statistics, SharedMemorySink(self._kept) if self._kept else None)
+        self.ring = Ring(_CAPACITY_ROWS, mapped(ring, size_of(_CAPACITY_ROWS, len(further))), further)
+        self.figures = SummarySink(statistics, self._keeper(Lengths()))
         self.dropped = 0
         self.pid: int | None = None
         self._shared = [*self._files, *(() if mailbox is None else (mailbox,))]
@@ -130,6 +133,7 @@ class TelemetryProcess:
             unattended,
             mailbox,
             speed,
+            further,
         )
         self._model = model
 
@@ -254,10 +258,9 @@ class TelemetryProcess:
         state: WorkerState = self._ledger.read() or WorkerState(
             0, 0, 0, self.figures.statistics, Lengths(), []
         )
-        keeper = SharedMemorySink(self._kept, state.kept) if self._kept else None
-        self.figures = SummarySink(state.statistics, keeper)
+        self.figures = SummarySink(state.statistics, self._keeper(state.kept))
         self.figures.troubles += state.troubles
-        ring = Ring(self.ring.capacity, self.ring.memory)
+        ring = self.ring.reader()
         ring.position, ring.dropped = state.position, state.dropped
         audience = SinkDispatcher(ring, [self.figures], model=self._model)
         missing = min(self._events - state.events, len(self._told))
@@ -265,6 +268,10 @@ class TelemetryProcess:
             audience.event(event)
         audience.dispatch()
         self.dropped = ring.dropped
+
+    def _keeper(self, lengths: Lengths) -> SharedMemorySink | None:
+        """Return what keeps columns and events, behind what is kept already; None if nothing does."""
+        return SharedMemorySink(self._kept, lengths, self.ring.further) if self._kept else None
 
     def _go_without(self, why: str) -> None:
         self._warn(

@@ -25,6 +25,7 @@ from dcmp_hil.platform import process_log
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.heap import trim
 from dcmp_hil.telemetry.dispatcher import BLOCK_PERIOD_S, DispatchThread, SinkDispatcher
+from dcmp_hil.telemetry.further_columns import begin
 from dcmp_hil.telemetry.parent_exit import how_it_died
 from dcmp_hil.telemetry.rerun.stream_worker import THREAD
 from dcmp_hil.telemetry.summary_sink import Lengths, SharedMemorySink, SummarySink
@@ -67,6 +68,8 @@ class WorkerSetup:
         Descriptor of the memory in which the run says how it ended; None if it does not.
     speed
         How many times faster than real time the rows come.
+    further
+        Names of the further fields of a row.
     """
 
     capacity: int
@@ -79,6 +82,7 @@ class WorkerSetup:
     unattended: bytes = b""
     mailbox: int | None = None
     speed: float = 1.0
+    further: tuple[str, ...] = ()
 
 
 class WorkerState(NamedTuple):
@@ -118,9 +122,11 @@ def main(parent: ParentProcess, terminal: int) -> None:
 class _TelemetryWorker:
     def __init__(self, setup: WorkerSetup, parent: ParentProcess) -> None:
         self._setup, self._channel, self._parent = setup, parent.channel, parent
-        self._keeper = SharedMemorySink(setup.kept) if setup.kept else None
+        further = setup.further
+        self._keeper = SharedMemorySink(setup.kept, further=further) if setup.kept else None
         self._figures = SummarySink(setup.statistics, self._keeper)
-        self._ring = Ring(setup.capacity, mapped(setup.ring, size_of(setup.capacity)))
+        size = size_of(setup.capacity, len(further))
+        self._ring = Ring(setup.capacity, mapped(setup.ring, size), further)
         self._audience = SinkDispatcher(self._ring, [self._figures], self._tell, setup.model)
         self._ledger = Ledger(setup.ledger)
         self._services: list[DispatchThread] = []
@@ -162,14 +168,14 @@ class _TelemetryWorker:
         for data in self._setup.sinks:
             try:
                 sink: Sink = pickle.loads(data)()  # noqa: S301 - written by our own parent
+                begin(sink, self._setup.further)
             except ConfigError:
                 raise
             except Exception as error:  # noqa: BLE001 - after any error of a sink, the run goes on
                 warnings.append(f"A sink could not be made: {type(error).__name__}: {error}")
                 continue
             warnings += getattr(sink, "warnings", ())
-            ring = Ring(self._ring.capacity, self._ring.memory)
-            audience = SinkDispatcher(ring, [sink], self._tell, self._setup.model)
+            audience = SinkDispatcher(self._ring.reader(), [sink], self._tell, self._setup.model)
             interval = getattr(sink, "interval", BLOCK_PERIOD_S) / self._setup.speed
             self._services.append(DispatchThread(audience, interval))
         return warnings

@@ -28,6 +28,7 @@ from dcmp_hil.recording.metadata import about, git_state, rig_json
 from dcmp_hil.recording.reader import read_run
 from dcmp_hil.recording.writer import RecordingSink
 from dcmp_hil.session import Session
+from dcmp_hil.telemetry.further_columns import CHANNEL_NAMES
 from dcmp_hil.values import CauseData, Event, EventKind
 from tests.helpers import bench
 from tests.telemetry.runs import EVENTS, blocks, cycle, truth
@@ -99,17 +100,17 @@ def test_ros_reads_every_number_of_every_period(tmp_path: Path) -> None:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         seen = [message for *_, message in reader.iter_decoded_messages(topics=[schema.CYCLES])]
         logs = [json.loads(message.data) for *_, message in reader.iter_messages(topics=[schema.EVENTS])]
-    table = [[getattr(message, name) for name in schema.CHANNEL_NAMES] for message in seen]
+    table = [[getattr(message, name) for name in CHANNEL_NAMES] for message in seen]
     np.testing.assert_array_equal(np.array(table), rows)
     assert [log["message"] for log in logs] == [event.text for event in EVENTS]
 
 
 def test_names_have_units_and_are_those_that_ros_allows() -> None:
-    assert len(schema.CHANNEL_NAMES) == len(set(schema.CHANNEL_NAMES)) == len(FIELDS)
+    assert len(CHANNEL_NAMES) == len(set(CHANNEL_NAMES)) == len(FIELDS)
     assert {"position_rad", "voltage_sent_v", "lateness_s", "disturbance_estimate_rad_s2"} <= set(
-        schema.CHANNEL_NAMES
+        CHANNEL_NAMES
     )
-    assert all(name == name.lower() and "__" not in name for name in schema.CHANNEL_NAMES)
+    assert all(name == name.lower() and "__" not in name for name in CHANNEL_NAMES)
 
 
 # ---------------------------------------------------------------------------------------------- cut off

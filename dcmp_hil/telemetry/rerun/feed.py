@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.rerun.blueprint import dashboard
 from dcmp_hil.telemetry.rerun.entity_columns import Frames
 from dcmp_hil.telemetry.rerun.font_text import drawable
@@ -18,6 +17,7 @@ from dcmp_hil.values import EventKind
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dcmp_hil.telemetry.block import Block
     from dcmp_hil.telemetry.rerun.entity_columns import Call
     from dcmp_hil.telemetry.rerun.rig_view import RigView
     from dcmp_hil.telemetry.rerun.stream_worker import StreamWorker
@@ -107,7 +107,7 @@ class Feed:
     def _cut(self, block: Block) -> list[Block]:
         """Cut what is longer than a second, as in virtual time, into pieces of about a second."""
         pieces = max(1, round(len(block) * self._period / _PIECE_TIME_S))
-        return [Block(rows, block.model) for rows in np.array_split(block.rows, pieces)]
+        return [block.with_rows(rows) for rows in np.array_split(block.rows, pieces)]
 
 
 def send(calls: Sequence[Call], stream: rr.RecordingStream) -> None:
@@ -127,4 +127,4 @@ def _show_trip(rig: RigView, stream: rr.RecordingStream) -> None:
 def _joined(blocks: list[Block]) -> Block:
     if len(blocks) == 1:
         return blocks[0]
-    return Block(np.concatenate([block.rows for block in blocks]), blocks[0].model)
+    return blocks[0].with_rows(np.concatenate([block.rows for block in blocks]))
