@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError, DcmpError
-from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of
+from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of, unheard
 from dcmp_hil.live.stop_command import STOP_TIME_MAX_S, End, Stopped, is_alive, stop_run
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def find_run(pid: int | None = None) -> int:
     ConfigError
         If there is none, or there are several and none was named.
     """
-    runs = running()
+    runs = running() or unheard()  # which take no request but STOP
     if pid is not None and pid not in runs and mailbox_of(pid) is None:
         raise ConfigError(f"No run of process {pid} listens here. {_listed(runs)}")
     if pid is not None:

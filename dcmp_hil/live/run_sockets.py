@@ -49,16 +49,30 @@ def socket_of(pid: int) -> Path:
 
 def running() -> list[int]:
     """Return the process ids of the runs that listen, oldest first; what others left behind is removed."""
-    found: list[tuple[float, int]] = []
+    return _runs()[0]
+
+
+def unheard() -> list[int]:
+    """Return the process ids of the runs that go on without their command process, oldest first."""
+    return _runs()[1]
+
+
+def _runs() -> tuple[list[int], list[int]]:
+    """Return the runs that listen, and those whose socket has outlived the process that listened."""
+    listening: list[tuple[float, int]] = []
+    silent: list[tuple[float, int]] = []
     for path in folder().glob("*.sock"):
         if not path.stem.isdigit():
             continue
-        if _alive(path):
-            with suppress(OSError):
-                found.append((path.stat().st_mtime, int(path.stem)))
-        else:
+        pid = int(path.stem)
+        heard = _alive(path)
+        mailbox = None if heard else mailbox_of(pid)
+        if not heard and mailbox is None:
             path.unlink(missing_ok=True)
-    return [pid for _, pid in sorted(found)]
+        elif heard or (mailbox and not mailbox.ended):
+            with suppress(OSError):
+                (listening if heard else silent).append((path.stat().st_mtime, pid))
+    return [pid for _, pid in sorted(listening)], [pid for _, pid in sorted(silent)]
 
 
 def peer_of(connection: socket.socket) -> tuple[int, int]:

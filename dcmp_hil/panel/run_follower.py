@@ -9,7 +9,7 @@ from typing import Any
 
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live.envelopes import BucketHistory
-from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of
+from dcmp_hil.live.run_sockets import mailbox_of, running, socket_of, unheard
 from dcmp_hil.live.state import end_of
 from dcmp_hil.live.stop_command import is_alive
 
@@ -54,7 +54,7 @@ class Watcher:
             await asyncio.sleep(_SEARCH_PERIOD_S)
 
     def _find(self) -> int | None:
-        runs = _listening()
+        runs = [*_unheard(), *_listening()]  # one that goes on unseen can be stopped
         if self._wanted is not None:
             return self._wanted if self._wanted in runs else None
         return runs[-1] if runs else None
@@ -118,5 +118,13 @@ def _listening() -> list[int]:
     """Return the runs that listen, oldest first; none where their folder is not this user's own."""
     try:
         return running()
+    except ConfigError:
+        return []
+
+
+def _unheard() -> list[int]:
+    """Return the runs whose command process is gone, oldest first; none as for `_listening`."""
+    try:
+        return unheard()
     except ConfigError:
         return []

@@ -129,13 +129,14 @@ def _processes_of(folder: Path) -> list[int]:
     return found
 
 
-def test_stop_works_when_the_command_process_is_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("named", [True, False])
+def test_stop_works_when_the_command_process_is_killed(tmp_path: Path, named: bool) -> None:
     run_options = ("--viewer", "none", "--no-record", "--duration", "0", "--json", "figures.json")
     with started(tmp_path, "run", "bench-1khz", *run_options) as run:
         until_running(run)
         os.kill(command_process_of(run.pid), signal.SIGKILL)
         done = subprocess.run(
-            [sys.executable, "-m", "dcmp_hil", "stop", "--run", str(run.pid)],
+            [sys.executable, "-m", "dcmp_hil", "stop", *(("--run", str(run.pid)) if named else ())],
             capture_output=True,
             text=True,
             timeout=TIMEOUT_S,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -16,6 +17,7 @@ import pytest
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.live import client, run_sockets
 from dcmp_hil.live.stop_command import End
+from dcmp_hil.panel.run_follower import Watcher
 from tests.live.processes import TIMEOUT_S, command_process_of, started, until, until_running
 
 pytestmark = pytest.mark.usefixtures("own_run_folder")
@@ -85,14 +87,27 @@ def test_run_goes_on_and_warns_when_the_command_process_is_killed(tmp_path: Path
     with started(tmp_path, *_RUN) as run:
         until_running(run)
         os.kill(command_process_of(run.pid), signal.SIGKILL)
-        until(lambda: not run_sockets.running(), "its socket was cleaned up")
+        until(lambda: not run_sockets.running(), "it listened no more")
         assert run.poll() is None
+        assert run_sockets.unheard() == [run.pid]
+        assert asyncio.run(_first_seen()) == ("unseen", run.pid)
         run.send_signal(signal.SIGINT)
         _, err = run.communicate(timeout=TIMEOUT_S)
     figures = json.loads((tmp_path / "figures.json").read_text())
     assert run.returncode == 0
+    assert run_sockets.unheard() == run_sockets.running() == []
+    assert not run_sockets.socket_of(run.pid).exists()
     assert err.count("The command process ended") == 1
     assert sum("The command process ended" in trouble for trouble in figures["troubles"]) == 1
+
+
+async def _first_seen() -> tuple[str, int]:
+    """Return what a panel that is opened now shows, once it has found a run."""
+    watcher = Watcher(None)
+    watching = asyncio.ensure_future(watcher.watch())
+    await asyncio.to_thread(until, lambda: watcher.state["connection"] != "none", "the run was found")
+    watching.cancel()
+    return watcher.state["connection"], watcher.state["pid"]
 
 
 def test_command_process_leaves_when_its_run_is_killed(tmp_path: Path) -> None:
