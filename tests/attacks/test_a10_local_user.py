@@ -117,17 +117,25 @@ def _recording_id(file: Path) -> str:
 def test_a_dashboard_is_served_no_more_where_another_user_is_connected() -> None:
     sink = RerunSink(VIEW, None, "serve", port=free_port())
     assert sink.port is not None
-    port, first = sink.port, blocks(3000)
-    sink.block(first[0])
-    assert sink.warnings == []
+    port = sink.port
+    (block, *_) = blocks(100)
+    sink.block(block)
+    with socket.create_connection(("127.0.0.1", port)):
+        time.sleep(0.2)
+        sink.block(block)
+    assert sink.warnings == []  # this user's own
     with _as_another_user(_CONNECTS, str(port)) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "connected\n"
-        for block in first[1:5]:
+
+        def warned() -> bool:  # at the first block after the server has accepted the connection
             sink.block(block)
-        assert [f"number {_OTHER_USER_ID}" in one and "served any more" in one for one in sink.warnings] == [
-            True
-        ]
+            return bool(sink.warnings)
+
+        until(warned, "the other user was seen")
+        (warning,) = sink.warnings
+        assert f"number {_OTHER_USER_ID}" in warning
+        assert "served any more" in warning
         until(lambda: not answers(port, 0.1), "the server ended")
         other.kill()
     sink.close()
@@ -140,6 +148,35 @@ def test_this_user_s_own_viewers_are_left_alone() -> None:
         port = server.getsockname()[1]
         with socket.create_connection(("127.0.0.1", port)):
             assert other_users.strangers(port) == []
+
+
+def test_the_kernel_s_table_is_read_when_a_connection_is_new(monkeypatch: pytest.MonkeyPatch) -> None:
+    reads: list[int] = []
+
+    def one_stranger(port: int) -> list[int]:
+        reads.append(port)
+        return [4711]
+
+    monkeypatch.setattr(other_users, "strangers", one_stranger)
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        port = server.getsockname()[1]
+        watch = other_users.StrangerWatch(port)
+        assert watch.look() == [4711]  # of what was there before the first look
+        assert watch.look() == []
+        with socket.create_connection(("127.0.0.1", port)):
+            accepted, _ = server.accept()
+            assert watch.look() == [4711]
+            number = accepted.fileno()
+            accepted.close()
+        with socket.create_connection(("127.0.0.1", port)):
+            again, _ = server.accept()
+            with again:
+                assert again.fileno() == number  # of a descriptor, which is no name of a connection
+                assert watch.look() == [4711]
+        assert watch.look() == []
+    assert reads == [port] * 3
 
 
 def test_sockets_are_this_user_s_alone_and_the_kernel_says_who_knocks(tmp_path: Path) -> None:

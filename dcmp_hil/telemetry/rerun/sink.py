@@ -14,7 +14,7 @@ from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.platform.disk_space import kept_for_data, room_for, short_of
 from dcmp_hil.platform.display import display_problem
-from dcmp_hil.platform.other_users import strangers
+from dcmp_hil.platform.other_users import StrangerWatch
 from dcmp_hil.telemetry.rerun import viewer as window
 from dcmp_hil.telemetry.rerun.dashboard_warnings import (
     NO_ROOM,
@@ -111,6 +111,7 @@ class RerunSink:
     ) -> None:
         self.warnings: list[str] = []
         self.port: int | None = None
+        self._watch: StrangerWatch | None = None
         self._window: subprocess.Popen[bytes] | None = None
         self._rig = rig
         self._feeds: list[Feed] = []
@@ -190,10 +191,10 @@ class RerunSink:
 
     def _keep_to_ourselves(self) -> None:
         """End the server where another user is connected to it: Rerun does not authenticate its clients."""
-        if self.port is None or not (users := strangers(self.port)):
+        if self._watch is None or not (users := self._watch.look()):
             return
         self.warnings.append(OTHER_USERS_WARNING.format(user=users[0], port=self.port))
-        self.port = None
+        self.port = self._watch = None
         for feed in [one for one in self._feeds if one.outlet.file is None]:
             feed.outlet.farewell = lambda: None
             feed.outlet.leave()
@@ -268,7 +269,8 @@ class RerunSink:
             )
             outlet = self._open_viewer(target, _CLOSE_TIMEOUT_S)
             if window.serves(port, os.getpid(), _SERVER_START_TIMEOUT_S):
-                self.port = port
+                self.port, self._watch = port, StrangerWatch(port)
+                outlet.farewell = partial(window.let_viewers_catch_up, port)
                 return outlet
             outlet.leave()  # another process took the port first
             self._feeds.pop()
@@ -287,5 +289,5 @@ class RerunSink:
                 f"The viewer did not start ({error}); try: rerun --connect {window.proxy_url(port)}"
             )
             return
-        outlet.farewell = partial(window.let_viewer_catch_up, process, port)
+        outlet.farewell = partial(window.let_viewers_catch_up, port, process)
         self._window = process

@@ -25,7 +25,8 @@ _ANSWER_TIMEOUT_S = 3.0
 """Seconds that a server may take on a busy computer; a port without a listener refuses at once."""
 _FETCH_TIMEOUT_S = 10.0
 """Seconds; a window takes a second or two to open, and a run in virtual time may be over by then."""
-_CAUGHT_UP_CHECKS = 5  # looks in a row, 0.1 s apart, with nothing left to send
+_CAUGHT_UP_CHECKS, _STUCK_CHECKS = 5, 10
+"""Looks in a row, 0.1 s apart, with nothing left to send, or with as much as before."""
 _CONNECTIONS = Path("/proc/net/tcp")
 _ESTABLISHED, _LISTENING = "01", "0A"  # in there
 _HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(
@@ -206,16 +207,30 @@ def served(first: int = VIEWER_PORT) -> list[int]:
     return [port for port in range(first, first + _PORT_ATTEMPTS_MAX) if speaks_http2(port)]
 
 
-def let_viewer_catch_up(viewer: subprocess.Popen[bytes], port: int) -> None:
-    """Wait until `viewer` has fetched what is served on `port`, for 10 s at most."""
+def let_viewers_catch_up(port: int, opening: subprocess.Popen[bytes] | None = None) -> None:
+    """Wait until viewers have fetched what is served on `port`: 10 s at most, 1 s for one that takes nothing.
+
+    Parameters
+    ----------
+    port
+        On 127.0.0.1.
+    opening
+        A viewer that is waited for until it is connected, or ends. Without one, and without a connection,
+        there is nothing to wait for.
+    """
     if not _CONNECTIONS.exists():  # not Linux: it cannot be found out
         return
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_FETCH_TIMEOUT_S * 1e9)
-    quiet = 0
-    while quiet < _CAUGHT_UP_CHECKS and clock.now_ns() < end_ns and viewer.poll() is None:
+    quiet = stuck = 0
+    before: list[int] = []
+    while quiet < _CAUGHT_UP_CHECKS and stuck < _STUCK_CHECKS and clock.now_ns() < end_ns:
         unsent = _unsent(port)
+        if not unsent and (opening is None or opening.poll() is not None):
+            return
         quiet = quiet + 1 if unsent and not any(unsent) else 0
+        stuck = stuck + 1 if any(unsent) and unsent == before else 0
+        before = unsent
         pause(0.1)
 
 
