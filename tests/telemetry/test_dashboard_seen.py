@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.telemetry.rerun.plots import plots
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.telemetry.signals import ERROR_RGB, ESTIMATE_RGB, REFERENCE_RGB, VOLTAGE_RGB
 from dcmp_hil.values import Event, EventKind, PhaseData
+from tests.telemetry.drawn_once import drawn_once
+from tests.telemetry.pixels import pixels
 from tests.telemetry.runs import VIEW, blocks
 from tests.telemetry.test_marks import CHANGE, PHASE, TRIP
 from tools.screenshot import draw, headless_viewer, wait_until_loaded
@@ -48,27 +50,31 @@ def write(path: Path, *, tripped: bool) -> None:
     sink.close()
 
 
+def _draw(tripped: bool, folder: Path) -> dict[str, str]:
+    """Draw every plot; return the names of the pictures by title."""
+    write(folder / "run.rrd", tripped=tripped)
+    wanted = {plot.titled for plot in plots()}
+    pictures: dict[str, str] = {}
+    with headless_viewer(str(folder / "run.rrd"), size=_SIZE) as viewer:
+        wait_until_loaded(viewer)
+        at = _HOURS_S + (7.9 if tripped else 6.99)
+        viewer.set_time("loop_time", duration=at, play_state="paused")
+        draw(viewer, folder / "whole.png")
+        for view in viewer.get_state().views:
+            if view.name in wanted:
+                pictures[view.name] = f"{len(pictures)}.png"
+                draw(viewer, folder / pictures[view.name], view.view_id, calm=0.1)
+    assert pictures.keys() == wanted
+    return pictures
+
+
 @pytest.fixture(scope="module", params=[False, True], ids=["running", "tripped"])
 def seen(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, NDArray[np.int16]]:
     """Return the picture of every plot by its title."""
-    folder = tmp_path_factory.mktemp("seen")
-    write(folder / "run.rrd", tripped=request.param)
-    wanted = {plot.titled for plot in plots()}
-    pictures = {}
-    with headless_viewer(str(folder / "run.rrd"), size=_SIZE) as viewer:
-        wait_until_loaded(viewer)
-        at = _HOURS_S + (7.9 if request.param else 6.99)
-        viewer.set_time("loop_time", duration=at, play_state="paused")
-        draw(viewer, folder / "whole.png")
-        for view in viewer.get_state().views:
-            if view.name in wanted:
-                draw(viewer, folder / "view.png", view.view_id, calm=0.1)
-                with Image.open(folder / "view.png") as image:
-                    pictures[view.name] = np.asarray(image.convert("RGB"), dtype=np.int16)
-    assert pictures.keys() == wanted
-    return pictures
+    folder, names = drawn_once(tmp_path_factory, f"seen-{request.param}", partial(_draw, request.param))
+    return {title: pixels(folder / name) for title, name in names.items()}
 
 
 def like(picture: NDArray[np.int16], colour: tuple[int, int, int], within: int = 30) -> NDArray[np.bool_]:

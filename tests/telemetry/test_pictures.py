@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +16,7 @@ from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.telemetry.rerun.marks import MARKS
 from dcmp_hil.telemetry.rerun.plots import Plot, plots
 from tests.panel.browser import needed
+from tests.telemetry.drawn_once import drawn_once
 from tests.telemetry.pixels import near, pixels
 from tools.pictures import CHANGED_AT_S, PUSHED_AT_S, SIZES, native, web
 from tools.screenshot import Seen, save
@@ -98,17 +100,28 @@ class Screen(NamedTuple):
 
     plots: list[Shown]
     banner: Path
-    seen: Seen
+    complaints: list[str]
 
 
-def _plots(viewer: ViewerClient, folder: Path) -> list[Shown]:
-    by_title = {plot.titled: plot for plot in plots()}
-    found: list[Shown] = []
-    for view in viewer.get_state().views:
-        if view.visible and view.name in by_title:
-            picture = folder / f"{len(found)}.png"
-            save(viewer, picture, view.view_id)
-            found.append(Shown(by_title[view.name], picture))
+def _draw_plots(viewer: ViewerClient, folder: Path, state: str) -> list[str]:
+    """Save a picture of each plot of a state; return their titles."""
+    titles = {plot.titled for plot in plots()}
+    views = [view for view in viewer.get_state().views if view.visible and view.name in titles]
+    for number, view in enumerate(views):
+        save(viewer, folder / f"{state}-{number}.png", view.view_id)
+    return [view.name for view in views]
+
+
+def _draw(size: str, folder: Path) -> dict[str, dict[str, list[str]]]:
+    """Draw both states on one screen; pictures of the whole are kept with the reports."""
+    found = {}
+    for state, picture, viewer in native(folder, size):
+        _keep(picture)
+        titles = _draw_plots(viewer, folder, state)
+        (words,) = [view for view in viewer.get_state().views if view.name == "State"]
+        save(viewer, folder / f"{state}-banner.png", words.view_id)
+        seen = Seen(viewer.get_state(), viewer.get_logs())
+        found[state] = {"titles": titles, "complaints": seen.complaints}
     return found
 
 
@@ -140,22 +153,26 @@ def _keep(picture: Path) -> None:
 
 @pytest.fixture(scope="module", params=SIZES)
 def screens(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Screen]:
-    """Return both states of a run on one screen; pictures of the whole are kept with the reports."""
-    found = {}
-    for state, picture, viewer in native(tmp_path_factory.mktemp("whole"), request.param):
-        _keep(picture)
-        folder = tmp_path_factory.mktemp(state)
-        shown = _plots(viewer, folder)
-        (words,) = [view for view in viewer.get_state().views if view.name == "State"]
-        save(viewer, folder / "banner.png", words.view_id)
-        found[state] = Screen(shown, folder / "banner.png", Seen(viewer.get_state(), viewer.get_logs()))
-    return found
+    """Return both states of a run on one screen."""
+    folder, said = drawn_once(tmp_path_factory, request.param, partial(_draw, request.param))
+    by_title = {plot.titled: plot for plot in plots()}
+    return {
+        state: Screen(
+            [
+                Shown(by_title[title], folder / f"{state}-{number}.png")
+                for number, title in enumerate(of_state["titles"])
+            ],
+            folder / f"{state}-banner.png",
+            of_state["complaints"],
+        )
+        for state, of_state in said.items()
+    }
 
 
 def test_the_viewer_complains_of_nothing_and_shows_every_plot(screens: dict[str, Screen]) -> None:
     wanted = {plot.titled for plot in plots()}
     for screen in screens.values():
-        assert screen.seen.complaints == []
+        assert screen.complaints == []
         assert {shown.plot.titled for shown in screen.plots} == wanted
 
 
