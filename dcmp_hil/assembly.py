@@ -26,6 +26,7 @@ from dcmp_hil.safety.polarity_check import probe_for
 from dcmp_hil.safety.speed_resolution import resolution
 from dcmp_hil.safety.supervisor import Supervisor
 from dcmp_hil.telemetry.block import ReferenceAligner
+from dcmp_hil.telemetry.diagnosis_columns import diagnosis_of
 from dcmp_hil.telemetry.further_columns import joined
 from dcmp_hil.telemetry.recorder import Recorder
 
@@ -146,9 +147,11 @@ def make_laws(rig: Rig) -> Laws:
     Raises
     ------
     ConfigError
-        If a class named `module:Class` cannot be found or made.
+        If a class named `module:Class` cannot be found or made, or its diagnosis has names that are none.
     """
-    return Laws(make_observer(rig), make_controller(rig), joined(()))
+    observer = make_observer(rig)
+    diagnosis = diagnosis_of(observer, rig.observer.kind)
+    return Laws(observer, make_controller(rig), joined([diagnosis]))
 
 
 def make_observer(rig: Rig) -> Observer:

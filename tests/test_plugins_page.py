@@ -43,6 +43,7 @@ def test_observer_and_controller_of_the_page_run() -> None:
     assert result.summary.periods == 2000
     assert result.summary.tracking_rms_rad is not None
     assert result.summary.tracking_rms_rad < 0.2
+    assert result.columns["difference_rad_s"].any()
 
 
 @pytest.mark.usefixtures("lab")

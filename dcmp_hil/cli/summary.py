@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
+    from dcmp_hil.telemetry.friction_findings import FrictionFindings
     from dcmp_hil.telemetry.statistics import DurationHistogram, Percentiles
 
 _BAR_CHARS = " ▁▂▃▄▅▆▇█"
 _UNITS = ((1e-6, "s"), (1e-3, "ms"), (1.0, "µs"))
+_TWO_DECIMALS_MIN = 0.005  # smaller numbers would be 0.00
 _WHOLE_MIN_US = 10_000.0  # longer durations are shown without decimals
 _HOW_OFTEN = (
     "how often: a bar for each range of durations, up to 1, 2, 5, 10, 20, 50 ... µs,",
@@ -55,6 +57,8 @@ def _figures(result: Result) -> Table:
     ):
         if value:  # what is not known has no row: the errors of an estimate on a device, for one
             table.add_row(what, value, unit)
+    for row in _friction(figures.friction):
+        table.add_row(*row)
     if result.link is not None:
         for row in _link(result):
             table.add_row(*row)
@@ -63,6 +67,24 @@ def _figures(result: Result) -> Table:
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table
+
+
+def _friction(found: FrictionFindings | None) -> list[tuple[str, str, str]]:
+    """Return the rows of an observer that finds friction: how much, and how often it let go of its model."""
+    if found is None:
+        return []
+    times, t = found.let_go, found.largest_distrust_t_s
+    largest = "" if t is None else f"{'' if times == 1 else 'largest '}at {t:.1f} s"
+    rows = [("let go of the model", str(times), f"time{'s' * (times != 1)}{', ' * bool(largest)}{largest}")]
+    if found.found_rad_s2 is not None and found.deviation_rad_s2 is not None:
+        value = f"{found.found_rad_s2:.2f} ± {_deviation(found.deviation_rad_s2)}"
+        rows.insert(0, ("friction", value, f"rad/s² (model {found.model_rad_s2:.3g})"))
+    return rows
+
+
+def _deviation(value: float) -> str:
+    """Return a deviation to two decimals, or to one digit where that is more."""
+    return f"{value:.2f}" if value >= _TWO_DECIMALS_MIN else f"{value:.1g}"
 
 
 def _link(result: Result) -> list[tuple[str, str, str]]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dcmp_hil.telemetry.friction_findings import FrictionFindings, FrictionStatistics
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -68,6 +70,8 @@ class Summary:
     realtime_factor: float
     """Device time over wall time, the whole run."""
     window_s: tuple[float, float]
+    friction: FrictionFindings | None = None
+    """Findings of an observer that finds friction by itself; None of the others."""
 
 
 class ErrorStatistics:
@@ -158,6 +162,7 @@ class Statistics:
             ErrorStatistics(),
         )
         self.period, self.lateness, self.compute = Durations(), Durations(), Durations()
+        self._friction = FrictionStatistics()
         self._periods = self._late = 0
         self._peak = self._variation = 0.0
         self._last_voltage = math.nan
@@ -180,6 +185,7 @@ class Statistics:
         self._periods += len(inside)
         self._late += int((block["lateness"][window] > _LATE_MIN_PERIODS * self._period).sum())
         self._add_voltage(block["voltage_sent"][window])
+        self._friction.add(block, window)
         if math.isnan(self._first_t):
             self._first_t, self._first_lateness = float(t[window][0]), float(block["lateness"][window][0])
         self._last_t, self._last_lateness = float(t[window][-1]), float(block["lateness"][window][-1])
@@ -214,6 +220,7 @@ class Statistics:
             window_s=(self._first_t, self._last_t + self._period)
             if self._periods
             else (self._from, self._from),
+            friction=self._friction.findings(),
         )
 
     def _add_voltage(self, voltage: NDArray[np.float64]) -> None:

@@ -166,6 +166,32 @@ def test_row(name: str) -> None:
         assert got.w < gate.w_ratio * other.w
 
 
+@pytest.mark.parametrize(("times", "overrides", "faults"), [(0, (), ()), (3, _HAND, _STEPS)])
+def test_summary_counts_how_often_it_let_go_of_its_model(
+    times: int, overrides: tuple[str, ...], faults: tuple[str, ...]
+) -> None:
+    found = _summary("friction_kalman", _THREE[0], overrides, faults).friction
+    assert found is not None
+    assert found.let_go == times
+    assert found.found_rad_s2 == pytest.approx(1.3, abs=0.02)
+    assert known(found.deviation_rad_s2) < 0.01
+    assert found.offered is None
+
+
+def test_nine_pushes_are_counted_and_offer_no_friction() -> None:
+    pushes = (*_PUSHES, "plant.push:rad_s2=15,ms=300,at=30s,for=1s")
+    found = _summary("friction_kalman", _THREE[0], _HAND, pushes).friction
+    assert found is not None
+    assert 9 <= found.let_go <= 11  # one each, and up to two more while the arm swings back, by phase
+    assert found.offered is None
+
+
+def test_friction_that_the_model_does_not_have_is_found_and_offered() -> None:
+    found = _summary("friction_kalman", _THREE[0], _plant(f1=1.2), ()).friction
+    assert found is not None
+    assert found.offered == pytest.approx(1.56, abs=0.05)
+
+
 def test_two_sines(tmp_path: Path) -> None:
     t = np.arange(0.0, 32.0, 1e-2)
     position = 0.6 * np.sin(1.3 * t) + 0.25 * np.sin(3.1 * t)

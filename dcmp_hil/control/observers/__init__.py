@@ -1,6 +1,6 @@
 """Observers: from sampled positions to position, velocity and disturbance; one file each."""
 
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from dcmp_hil.control.model import Model
 from dcmp_hil.errors import ProtocolError
@@ -17,6 +17,22 @@ class Observer(Protocol):
 
     def update(self, sample: Sample) -> Estimate:
         """Take the next sample and return the estimate at `sample.t`."""
+        ...
+
+
+class DiagnosedObserver(Protocol):
+    """Protocol of what an observer may have besides: numbers of its inside, for telemetry.
+
+    Attributes
+    ----------
+    DIAGNOSIS
+        Their names, lower case, each with its unit at the end, such as ``bias_rad``.
+    """
+
+    DIAGNOSIS: ClassVar[tuple[str, ...]]
+
+    def diagnose(self) -> tuple[float, ...]:
+        """Return a number for each name, after the last sample; called when the command has left."""
         ...
 
 
@@ -64,6 +80,7 @@ def standing_still(before: float, t: float) -> ProtocolError:
 __all__ = [
     "GAP_PERIODS_MAX",
     "STEP_TOLERANCE_PERIODS",
+    "DiagnosedObserver",
     "Observer",
     "ObserverContext",
     "Predictor",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
@@ -36,6 +36,7 @@ _SLOPE_NOISE, _FRICTION_NOISE = 5.0, 1e-3  # (rad/s3)2/s; (rad/s2)2/s
 _REVERSAL_NOISE, _REVERSAL_RAD_S = 1.0, 0.06  # (rad/s2)2/s, more of d below so many rad/s
 _UNCHANGED_COUNTS = 0.35  # standard deviation of an unchanged count, counts
 _FRICTION_MAX_RATIO = 4.0  # of the model's
+_FRICTION_VARIANCE = 12  # place in the covariance
 _RELEASE_GATE = 9.0  # variances: an edge this far off releases an arm that sticks
 _STEP_AGE_S, _STEP_DEVIATION_MAX = 0.025, 300.0  # s; rad/s2
 _STEP_CALM_MAX, _STEP_SPEED_MIN_RAD_S = 2.5, 0.1  # mean of m
@@ -82,6 +83,17 @@ class FrictionKalman:
         If the encoder is ideal: there are no edges.
     """
 
+    DIAGNOSIS: ClassVar[tuple[str, ...]] = (
+        "disturbance_found_rad_s2",  # d
+        "friction_found_rad_s2",  # f
+        "friction_deviation_rad_s2",  # square root of its variance
+        "slope_found_rad_s3",  # s
+        "distrust",  # m: times the noise of d
+        "edge_scatter",  # rho: times the variance of an edge
+        "stuck",  # 1 where the arm was predicted to stick, and was not seen to move
+        "disturbance_steps",  # that were assumed since the start
+    )
+
     def __init__(
         self,
         context: ObserverContext,
@@ -110,6 +122,13 @@ class FrictionKalman:
         self.trust = BELIEVED
         self.state: State = (math.nan, math.nan, math.nan, self._f1, 0.0)
         self.covariance: Covariance = (math.nan,) * 5 + (math.nan,) * 10
+
+    def diagnose(self) -> tuple[float, ...]:
+        """Return the state beside position and velocity, and how far it is to be trusted; see `DIAGNOSIS`."""
+        _, _, d, f, s = self.state
+        variance, trust = self.covariance[_FRICTION_VARIANCE], self.trust
+        deviation = math.sqrt(variance) if variance > 0.0 else 0.0
+        return d, f, deviation, s, trust[0], trust[5], float(self.sticks), float(self.steps)
 
     def retune(self, tuning: FrictionKalmanTuning) -> None:
         """Change the noises; the state stays."""
