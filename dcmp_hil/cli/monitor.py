@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from dcmp_hil.cli.options import Overrides, RigName, duration_of
+from dcmp_hil.cli.options import Overrides, RigName, length_of
 
 
 def monitor(
@@ -16,7 +16,7 @@ def monitor(
         float,
         typer.Option(
             metavar="TIME",
-            parser=duration_of("--duration"),
+            parser=length_of("--duration"),
             help="Length, such as 10s or 2min; 0 = until Ctrl-C.",
         ),
     ] = 0.0,

@@ -36,3 +36,18 @@ def duration_of(option: str) -> Callable[[str | float], float]:
             raise ConfigError(f"{option}: {error}") from None
 
     return read
+
+
+def length_of(option: str) -> Callable[[str | float], float]:
+    """Return what reads the value of an option: a duration that is 0 or more, in s; 0 is until Ctrl-C."""
+    duration = duration_of(option)
+
+    def read(value: str | float) -> float:
+        length = duration(value)
+        if length < 0.0:
+            raise ConfigError(
+                f'{option}: got "{value}"; expected 0 (until Ctrl-C) or more, such as 10s or 2min.'
+            )
+        return length
+
+    return read

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import re
 
-_SECONDS_PER_UNIT = {"": 1.0, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
-_DURATION = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zµ]*)", re.ASCII)
+_MICRO = "\N{MICRO SIGN}\N{GREEK SMALL LETTER MU}"  # keyboards have the one or the other; they look the same
+_SECONDS_PER_UNIT = {"": 1.0, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+_SECONDS_PER_UNIT |= {f"{micro}s": _SECONDS_PER_UNIT["us"] for micro in _MICRO}
+_DURATION = re.compile(rf"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-z{_MICRO}]*)", re.ASCII)
 
 EXAMPLES = "a time such as 3s, 200ms or 2min"
 """What is expected, in words."""

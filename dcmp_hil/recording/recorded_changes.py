@@ -58,8 +58,8 @@ class RecordedChanges(NamedTuple):
 def changes_in(events: Sequence[Event], rig: Rig, pinned: Collection[str] = ()) -> RecordedChanges:
     """Find the changes of a run, and those of them that a repetition with this rig can make.
 
-    A key of `pinned` stays what `rig` says. Of the rest, keys that cannot change in a run with this rig are
-    left out; then all that remains of one change is made, or nothing of it.
+    A key of `pinned` that this rig has stays what `rig` says. Of the rest, keys that cannot change in a run
+    with this rig are left out; then all that remains of one change is made, or nothing of it.
 
     Parameters
     ----------
@@ -75,10 +75,12 @@ def changes_in(events: Sequence[Event], rig: Rig, pinned: Collection[str] = ()) 
     for event in events:
         if not (isinstance(event.data, ChangeData) and event.data.values):
             continue
-        held, rest = _parted(event.data.values, pinned)
+        named, rest = _parted(event.data.values, pinned)
+        held, lacking = _parted(named, settable(rig))  # what the rig has not is not left out for its name
         if held:
             unrepeated.append(UnrepeatedChange(event.t, held, "pinned"))
-        refused, rest = _parted(rest, _unknown(rig, rest))
+        unknown, rest = _parted(rest, _unknown(rig, rest))
+        refused = lacking | unknown
         if refused:
             unrepeated.append(UnrepeatedChange(event.t, refused, "refused", _not_settable(rig, refused)))
         if not rest:

@@ -144,7 +144,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("needs_compiler")
-def test_one_of_each_is_found_wherever_it_belongs(tree: Path) -> None:
+def test_one_of_each_is_found_where_it_belongs(tree: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.additions.try_them"],
         cwd=tree,

@@ -111,3 +111,11 @@ def test_monitor_of_a_rig_without_a_wire_says_what_it_can_watch(cli: Cli) -> Non
     outcome = cli("monitor", "bench-1khz")
     assert outcome.code == 2
     assert "no wire to listen to" in only_line(outcome)
+
+
+@pytest.mark.parametrize("text", ["-3s", "-1e-9"])
+def test_a_duration_below_0_is_refused_before_a_port_is_opened(cli: Cli, text: str) -> None:
+    outcome = cli("monitor", f"--duration={text}", *way_to("/dev/no-such-port", "cobs"))
+    assert outcome.code == 2
+    said = f'error: --duration: got "{text}"; expected 0 (until Ctrl-C) or more, such as 10s or 2min.'
+    assert only_line(outcome) == said

@@ -128,6 +128,21 @@ def test_what_set_pins_is_pinned_in_every_variant(script: Script, whole: Recorde
     assert columns(tmp_path / "o.csv", "compare1") == cells(plain)
 
 
+def test_a_pinned_key_that_a_variant_lacks_is_not_left_out_because_it_was_given(
+    script: Script, whole: RecordedRun, tmp_path: Path
+) -> None:
+    options = ("--set", f"{MU0}=90", "--compare", "observer=paper", "--json", "o.json")
+    done = script("replay", str(whole.path), *options)
+    assert done.code == 0, done.err
+    (variant,) = json.loads((tmp_path / "o.json").read_text())["compared"]
+    told = [(one["why"], one["reason"]) for one in variant["unrepeated_changes"] if MU0 in one["values"]]
+    why = 'observer.kind = "paper" does not let it change in a run.'
+    assert told == [("refused", why), ("refused", why)]
+    said = [line for line in done.err.splitlines() if "observer.kind=paper: " in line]
+    assert said
+    assert not [line for line in said if "given" in line]
+
+
 @pytest.mark.parametrize("state", ["whole", "damaged"])
 def test_a_change_that_a_variant_cannot_take_is_told_and_the_rest_of_it_made(
     state: str, script: Script, request: pytest.FixtureRequest, tmp_path: Path

@@ -22,7 +22,8 @@ from sim_backend.faults.fault_spec import FaultSpec
         ("2min", 120.0),
         ("1.5h", 5400.0),
         ("250us", 250e-6),
-        ("250µs", 250e-6),
+        ("250\N{MICRO SIGN}s", 250e-6),
+        ("250\N{GREEK SMALL LETTER MU}s", 250e-6),
         ("-1", -1.0),
     ],
 )

@@ -33,6 +33,8 @@ STATEMENTS = [
     ("BO_ 80 EDGE", "BO_ 2147483728 EDGE", "EDGE: its identifier 2147483728 is extended, and has 11 bits"),
     # Names, and what is said of them
     ("EDGE: 8", "SAMPLE: 8", "line .*: 'BO_ 80 SAMPLE: 8 DEVICE' says again what line .* says; rename or"),
+    ("SG_ age_us", "SG_ age_µs", "line .*: age_µs has other letters than a to z and A to Z; rename it$"),
+    ("EDGE: 8", "ÉDGE: 8", "line .*: ÉDGE: has other letters than a to z and A to Z; rename it$"),
     ("SG_ age_us", "SG_ tick", "line .*: 'SG_ tick .*' says again what line .* says; rename or remove one"),
     ("VAL_ 144 id", "VAL_ 128 id", "line .*: 'VAL_ 128 id .*' says again what line .* says"),
     ("VAL_ 144 id", "VAL_ 145 id", "line .*: 'VAL_ 145 id .*' is about what is not there; correct its"),
@@ -118,6 +120,8 @@ RULES = [
     (END, END + 'BA_ "CEnum" SG_ 32 seq "dcmp_seq";\n', r"DRIVE\.seq names an enumeration, and has no"),
     ('CM_ SG_ 16 reason "Reason for a STOP.";\n', "", r"STOP\.reason names an enumeration, and has no"),
     ('"StopReason"', '"Stop-Reason"', r"STOP\.reason: name its enumeration as in StopReason \(Python\)"),
+    ('"StopReason"', '"StopÄnderung"', r"STOP\.reason: name its enumeration as in StopReason \(Python\)"),
+    ('"SampleReport"', '"SampleReportÄ"', "SAMPLE: its PythonClass is 'SampleReportÄ'; write it as in"),
     ('"ParameterResult"', '"Parameter"', r"PARAMETER_GET\.id and PARAMETER_VALUE\.result both name the"),
     (f"VAL_ 144 id {VALUES[1]}\n", "", r"PARAMETER_GET\.id and PARAMETER_SET\.id have different VAL_ rows"),
     # Names of the generated code

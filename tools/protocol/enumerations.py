@@ -1,4 +1,4 @@
-"""Enumerations: which fields have one, and that the rows of one are the same wherever they stand.
+"""Enumerations: which fields have one, and that the rows of one are the same in every place.
 
 The DBC format has no rows that several fields refer to, so that a parameter's stand at three fields.
 """
@@ -15,7 +15,8 @@ from tools.protocol.statements import DbcError
 if TYPE_CHECKING:
     from cantools.database.can import Database, Signal
 
-_PYTHON_NAME, _C_NAME = re.compile(r"(?:[a-z_]+\.)*[A-Z]\w*"), re.compile(r"dcmp_[a-z0-9_]+")
+_PYTHON_NAME = re.compile(r"(?:[a-z_]+\.)*[A-Z]\w*", re.ASCII)
+_C_NAME = re.compile(r"dcmp_[a-z0-9_]+")
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def layouts(found: list[Layout]) -> str:
 
 
 def _formatted(text: str) -> str:
-    """Return text in the project's own format, wherever this is called from."""
+    """Return text in the project's own format, in every current folder."""
     named = ["--config", str(ROOT / "pyproject.toml"), "--stdin-filename", str(ROOT / _FILE)]
     command = [sys.executable, "-m", "ruff", "format", *named, "-"]
     done = subprocess.run(command, input=text, capture_output=True, text=True, check=True, cwd=ROOT)  # noqa: S603

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 _LENGTHS = range(2, 9)  # bytes: a field and the crc8 at least, a classic CAN frame at most
 _OTHER_SIDE = {"HOST": "DEVICE", "DEVICE": "HOST"}
 _FIELD_NAME, _CONSTANT_NAME = (
-    re.compile(r"[a-z](?:\w*[A-Za-z0-9])?"),
+    re.compile(r"[a-z](?:\w*[A-Za-z0-9])?", re.ASCII),
     re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*"),
 )
 _KINDS = {
-    "PythonClass": (re.compile(r"[A-Z]\w*"), "SampleReport"),
+    "PythonClass": (re.compile(r"[A-Z]\w*", re.ASCII), "SampleReport"),
     "CStruct": (re.compile(r"dcmp_[a-z0-9_]+"), "dcmp_edge_stamp"),
 }
 """Forms of the names that a message may give its class and its structure."""

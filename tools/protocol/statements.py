@@ -100,10 +100,7 @@ def _statement(at: int, line: str) -> _Statement:
     named = fits.groupdict()
     if named.get("multiplexed"):
         raise DbcError(f"{where}: {named['signal']} is multiplexed; {_REMEDIES['SG_MUL_VAL_']}")
-    if "*/" in line or "/*" in line:
-        raise DbcError(f"{where}: {line!r} would begin or end a comment of C; leave the * or the / away")
-    if keyword == "CM_" and "|" in line:
-        raise DbcError(f"{where}: {line!r} would end a cell of the page's table; leave the | away")
+    _check_signs(where, line, keyword)
     number = named.get("message") or named.get("of")
     return _Statement(
         line=at,
@@ -114,6 +111,17 @@ def _statement(at: int, line: str) -> _Statement:
         signal=named.get("signal") or "",
         kind=named.get("kind") or ("SG_" if named.get("signal") else "BO_") * (number is not None),
     )
+
+
+def _check_signs(where: str, line: str, keyword: str) -> None:
+    """Refuse letters that C's names have not, and signs that would end what a text is written into."""
+    for word in re.sub(_TEXT, "", line).split():
+        if not word.isascii():
+            raise DbcError(f"{where}: {word} has other letters than a to z and A to Z; rename it")
+    if "*/" in line or "/*" in line:
+        raise DbcError(f"{where}: {line!r} would begin or end a comment of C; leave the * or the / away")
+    if keyword == "CM_" and "|" in line:
+        raise DbcError(f"{where}: {line!r} would end a cell of the page's table; leave the | away")
 
 
 def _placed(found: list[_Statement]) -> list[_Statement]:

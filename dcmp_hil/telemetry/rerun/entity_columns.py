@@ -33,7 +33,7 @@ _POSE_RATE_HZ = 50
 _SLOW_RATE_HZ = 1  # of lines that hardly change: a chunk costs 1.6 kB
 _EPILOGUE_TIME_S = 1.0  # s behind a trip that the picture goes on, so that its red lane has a width
 _LATE_MIN_PERIODS = 0.5  # of a period
-_LAMP_RADIUS = 1000.0  # of the view's own units: it fills the view, whatever its shape
+_LAMP_RADIUS = 1000.0  # of the view's own units: it fills a view of any shape
 
 
 class Frames:

@@ -108,7 +108,7 @@ STEPS = st.lists(
 
 @settings(max_examples=100, deadline=None)
 @given(steps=STEPS, flashed=st.integers(0, 5))
-def test_numbers_rise_whatever_is_lost(core: Core, steps: list[tuple[str, int, str]], flashed: int) -> None:
+def test_numbers_rise_with_every_loss(core: Core, steps: list[tuple[str, int, str]], flashed: int) -> None:
     board = Board(core, boot_count=flashed)
     told, attempts, losses = [flashed], 0, 1
     for kind, at, cut in steps:
