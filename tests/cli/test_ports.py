@@ -39,6 +39,12 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("needs_compiler")
 
 
+@pytest.fixture(autouse=True)
+def _no_ports_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the computer's own serial ports out: each is listened to for as long as `--wait` says, twice."""
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+
+
 @pytest.mark.parametrize("carrier", ["cobs", "slcan"])
 def test_ports_finds_the_device_on_either_carrier_and_says_how_to_run_it(cli: Cli, carrier: str) -> None:
     with device(carrier=carrier) as pump:
@@ -98,7 +104,6 @@ def test_ports_sees_a_device_in_use_on_a_bus_and_leaves_it_alone(
 
 
 def test_ports_says_what_to_do_where_there_is_nothing(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("serial.tools.list_ports.comports", list)
     monkeypatch.setattr("can.detect_available_configs", lambda **_: [])
     outcome = cli("ports")
     assert outcome.code == 0
@@ -165,7 +170,6 @@ def test_ports_names_what_is_not_the_default(cli: Cli, carrier: str) -> None:
 
 def test_ports_lists_every_device_of_a_bus(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     channel = "ports-two-devices"
-    monkeypatch.setattr("serial.tools.list_ports.comports", list)
     monkeypatch.setattr("dcmp_hil.device.discovery._can_channels", lambda: [("virtual", channel)])
     pumps = []
     for node in (9, 2):
@@ -187,7 +191,6 @@ def test_ports_and_monitor_notice_two_devices_with_one_node(
     cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     channel = "ports-one-node-twice"
-    monkeypatch.setattr("serial.tools.list_ports.comports", list)
     monkeypatch.setattr("dcmp_hil.device.discovery._can_channels", lambda: [("virtual", channel)])
     ending = threading.Event()
 
