@@ -2,16 +2,17 @@
 
 import os
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from tests import tracing
 from tests.firmware.core_library import compiler
 from tests.installed import Finished, environment, install
 from tests.live.processes import own_folder
-from tests.sampling import MARKER, chosen
+from tests.sampling import MARKER, chosen, file_is_drawn
 from tools import screenshot
 
 FIGURE = "figure"
@@ -34,7 +35,18 @@ def figure(record_property: Callable[[str, object], None]) -> Callable[[str], No
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Say how much of what is marked `sampled` is run."""
     parser.addoption("--sample", type=int, default=1, metavar="N", help=f"of tests marked {MARKER}, one in N")
+    parser.addoption("--sample-files", type=int, default=1, metavar="N", help="of a folder's files, one in N")
     parser.addoption("--sample-of", default="", metavar="TEXT", help="what draws them, such as a commit")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out the files of tests that are not drawn, before they are imported."""
+    if not collection_path.match("test_*.py"):
+        return None
+    drawn = file_is_drawn(
+        collection_path, config.getoption("--sample-files"), config.getoption("--sample-of")
+    )
+    return None if drawn else True
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m selects by markers
@@ -66,11 +78,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture
 def untraced() -> Iterator[None]:
-    """Run without coverage's tracer: a whole run is five times slower under it, and covers nothing new."""
-    tracer = sys.gettrace()
-    sys.settrace(None)
-    yield
-    sys.settrace(tracer)
+    """Run without coverage's tracer: a whole run is several times slower under it, and covers nothing new."""
+    with tracing.untraced():
+        yield
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Trace nothing of the folders of long tests, fixtures included."""
+    with tracing.untraced() if item.nodeid.startswith(tracing.UNTRACED) else nullcontext():
+        return (yield)
 
 
 @pytest.fixture(scope="session")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
 
 from dcmp_hil.paper import Reproduction, reproduce
 from dcmp_hil.session import Session
 from tests.cli.conftest import cli
+from tests.tracing import untraced
 
 __all__ = ["cli"]
 
@@ -17,12 +16,8 @@ _run = Session.run
 
 def _run_untraced(session: Session) -> None:
     """Run without coverage's tracer, as the fixture `untraced` does; what judges the run stays traced."""
-    tracer = sys.gettrace()
-    sys.settrace(None)
-    try:
+    with untraced():
         _run(session)
-    finally:
-        sys.settrace(tracer)
 
 
 @pytest.fixture(scope="session")
