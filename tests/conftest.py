@@ -76,17 +76,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.line(line)
 
 
-@pytest.fixture
-def untraced() -> Iterator[None]:
-    """Run without coverage's tracer: a whole run is several times slower under it, and covers nothing new."""
-    with tracing.untraced():
-        yield
-
-
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Trace nothing of the folders of long tests, fixtures included."""
-    with tracing.untraced() if item.nodeid.startswith(tracing.UNTRACED) else nullcontext():
+    """Run long tests without coverage's tracer, and the fixtures that are made for them."""
+    long = item.nodeid.startswith(tracing.FOLDERS) or item.get_closest_marker(tracing.MARKER)
+    with tracing.untraced() if long else nullcontext():
         return (yield)
 
 

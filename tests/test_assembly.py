@@ -119,7 +119,7 @@ def test_real_device_is_refused_virtual_time() -> None:
         run(bench(f"backend.kind={named(_Device)}"), duration=1.0, fast=True)
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_loop_runs_on_an_observer_and_a_controller_of_ones_own() -> None:
     class Position:
         def __init__(self, setting: ObserverContext) -> None:

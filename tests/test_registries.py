@@ -208,6 +208,7 @@ def test_every_plot_is_named_with_its_unit() -> None:
 
 
 @pytest.mark.parametrize("more", [(), MORE])
+@pytest.mark.untraced
 def test_every_plot_of_the_table_is_in_the_dashboard(
     monkeypatch: pytest.MonkeyPatch, more: tuple[signals.Signal, ...]
 ) -> None:

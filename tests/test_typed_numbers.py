@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tests.installed import Finished
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 def test_random_numbers_leave_no_arm_beyond_its_limits() -> None:

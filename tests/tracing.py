@@ -15,12 +15,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-UNTRACED = tuple(
+MARKER = "untraced"
+FOLDERS = tuple(
     f"tests/{name}/"
-    for name in (
-        *("attacks", "faults", "figures", "firmware", "install", "socketcan", "stateful", "target", "tools"),
-        "walk",
-    )
+    for name in ("figures", "firmware", "install", "socketcan", "stateful", "target", "tools", "walk")
 )
 """Folders whose tests are long, or run no line of the package that a test elsewhere does not."""
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from tests.installed import Finished
 
-pytestmark = pytest.mark.usefixtures("own_run_folder")
+pytestmark = [pytest.mark.usefixtures("own_run_folder"), pytest.mark.untraced]
 
 _MET = {
     "SignalsIgnored": "stop",

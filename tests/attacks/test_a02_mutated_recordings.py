@@ -119,7 +119,7 @@ def _wrong_lines(original: Original, csv: Path) -> str:
     return "" if -1 not in found and found == sorted(set(found)) else "a line that was never written"
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_two_thousand_mutants_give_no_wrong_row(originals: list[Original], tmp_path: Path) -> None:
     before = forget_peak()
     chance = random.Random(_SEED)

@@ -69,6 +69,7 @@ def test_damaged_samples_are_dropped_and_ridden_through(kind: str) -> None:
         assert backend.counters.lost >= 15
 
 
+@pytest.mark.untraced
 @wired
 @pytest.mark.parametrize(
     "of_board",

@@ -14,7 +14,7 @@ from tests.faults.null_plan import healthy
 from tests.faults.rows import PLAIN, ROWS, Row
 
 SEEDS = int(os.environ.get("DCMP_FAULT_SEEDS", "2"))
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 def cells(rows: tuple[Row, ...]) -> list[object]:

@@ -26,7 +26,7 @@ REASONS = {
     *("speed", "travel", "disturbance", "stuck", "power", "polarity", "not_finite", "gain", "moving"),
     *("saturation", "tracking", "jump", "chatter"),
 }
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 def drawn(rng: random.Random) -> FaultSpec:

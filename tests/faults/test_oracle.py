@@ -12,7 +12,7 @@ from tests.faults.matrix import judge
 from tests.faults.oracle import Oracle
 from tests.faults.rows import Row
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 class TakesOldCommands(Board):

@@ -14,7 +14,7 @@ from sim_backend.faults.fault_spec import FaultSpec
 from sim_backend.faults.plan import FaultPlan
 from tests.faults.oracle import Oracle
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 _RIG = ("backend.kind=sim-board", "encoder.zero=0", "reference.soft_start_s=0.5")
 
 

@@ -15,7 +15,7 @@ from tests import helpers
 from tests.figures.detection import ENGAGED_AT_S, detect
 from tests.helpers import STEADY, FaultySim, T, bench, setting
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from tools.encoders import healthy
 if TYPE_CHECKING:
     from tests.helpers import FaultySim
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 @pytest.mark.parametrize("counts", [256, 360, 400, 500, 1000, 2500, 8192, 65_536])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.statistics import Summary
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 _THREE = (0.1, 0.43, 0.77)  # counts
 _EIGHT = tuple(k / 8 + 0.03 for k in range(8))

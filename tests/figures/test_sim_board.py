@@ -8,7 +8,7 @@ import pytest
 from dcmp_hil import run
 from tests.helpers import STEADY, bench, figures, known
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 BOARD = ("backend.kind=sim-board", "encoder.zero=0")
 

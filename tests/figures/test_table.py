@@ -15,7 +15,7 @@ from dcmp_hil import run
 from dcmp_hil.errors import TripError
 from tests.helpers import STEADY, DelayedPlant, DemandedVoltage, HeldRun, bench, figures, known
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 _MRAD = 1e-3
 _PHASES = [0.0, 1 / 9, 2 / 9, 1 / 3, 4 / 9, 5 / 9, 2 / 3, 7 / 9, 8 / 9]  # counts

@@ -26,7 +26,7 @@ from tests.ipc.interruption import Made, is_interrupted
 if TYPE_CHECKING:
     from types import ModuleType
 
-pytestmark = pytest.mark.usefixtures("untraced")  # hundreds of children, each with coverage of its own
+pytestmark = pytest.mark.untraced  # hundreds of children, each with coverage of its own
 
 BOUND = 60.0  # s: generous, these machines are shared
 MODULE = "tests.ipc.child"

@@ -165,6 +165,7 @@ _CHANGES = st.one_of(
 _SCRIPTS = st.dictionaries(st.integers(1, 3900), _CHANGES.map(lambda one: [one]), min_size=1, max_size=12)
 
 
+@pytest.mark.untraced
 @settings(max_examples=25, deadline=None)
 @given(script=_SCRIPTS, seed=st.integers(0, 1000))
 def test_no_sequence_of_changes_breaks_a_limit(script: dict[int, list[str]], seed: int) -> None:

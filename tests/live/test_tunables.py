@@ -95,6 +95,7 @@ def test_reference_of_a_file_gives_way_to_a_sine(tmp_path: Path) -> None:
     assert "reference.kind" in change.words
 
 
+@pytest.mark.untraced
 @pytest.mark.parametrize("kind", ["sine", "chirp", "hold", "step", "trapezoid"])
 def test_knobs_are_what_is_settable_and_within_what_is_allowed(kind: str) -> None:
     rig = bench(f"reference.kind={kind}")

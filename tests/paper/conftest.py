@@ -15,7 +15,7 @@ _run = Session.run
 
 
 def _run_untraced(session: Session) -> None:
-    """Run without coverage's tracer, as the fixture `untraced` does; what judges the run stays traced."""
+    """Run without coverage's tracer, as tests that are marked so; what judges the run stays traced."""
     with untraced():
         _run(session)
 

@@ -109,7 +109,7 @@ def test_only_the_corrected_equations_reach_the_claim(reproduction: Reproduction
     assert tracking.corrected < tracking.claimed < min(tracking.printed_eq9, tracking.printed_eq10)
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_corrected_run_equals_the_shipped_rig_run_by_hand(reproduction: Reproduction) -> None:
     by_hand = run(load_rig("paper"), fast=True)
     assert reproduction.corrected.columns.keys() == by_hand.columns.keys()

@@ -93,7 +93,7 @@ def test_moreau_plant_sticks_until_the_drive_exceeds_friction(volts: float, move
     assert (truth.position != 0.0) == moves
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_moreau_plant_truly_sticks_at_every_reversal_of_the_rig() -> None:
     # theory.md, section 3: the arm sticks 2..80 ms at each reversal, t = 3 pi, 5 pi .. s; 8..92 ms measured
     # over nine encoder phases, 92 where an edge of the encoder lies at the reversal as it does here.

@@ -139,7 +139,7 @@ def test_table_is_the_firmwares(core: Core) -> None:
         assert found == following, event
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_firmware_goes_where_the_model_goes(core: Core) -> None:
     states, wrong = disagreements(core)
     assert wrong == 0, f"{wrong} differences in {states} states x {len(EVENTS)} events"
@@ -155,7 +155,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 @pytest.mark.parametrize("error", OTHERS, ids=str)
 def test_walk_notices_a_model_that_is_another(core: Core, error: str) -> None:
     assert disagreements(core, OTHERS[error])[1] > 0

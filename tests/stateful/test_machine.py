@@ -25,7 +25,7 @@ def budget(examples: int, length: int) -> settings:
 
 
 @pytest.mark.sampled
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 @pytest.mark.parametrize("part", range(PART_COUNT))
 def test_no_sequence_of_events_breaks_a_rule(part: int) -> None:
     steps = STEPS // PART_COUNT

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from tests.stateful.device_model import Table
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 def test_no_state_of_the_two_breaks_a_rule() -> None:

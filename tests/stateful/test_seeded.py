@@ -30,7 +30,7 @@ EXAMPLE_COUNT, RULES_PER_RUN = 1000, 100
 else is imported, so no smaller number holds in every order of the tests."""
 Patch = pytest.MonkeyPatch
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 
 def _table(phase: Phase, event: PhaseEvent, following: Phase) -> Callable[[Patch], None]:

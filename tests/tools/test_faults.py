@@ -58,7 +58,7 @@ def test_an_open_row_is_shown_and_fails_nothing() -> None:
     assert "seed 0: tick 7: 5 mV too much" in said
 
 
-@pytest.mark.usefixtures("untraced")
+@pytest.mark.untraced
 def test_rows_and_healthy_blocks_are_run() -> None:
     place = next(place for place, row in enumerate(ROWS) if row.fault == "firmware.stop")
     assert run_row(place, [1]).outcomes == {"STOPPED": 1}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.wire.frame import Frame
 
-pytestmark = pytest.mark.usefixtures("untraced")
+pytestmark = pytest.mark.untraced
 
 FILLS = (0x00000000, 0xFFFFFFFF, 0x55555555, 0xAAAAAAAA, 0x33333333, 0x00E0C01F)
 

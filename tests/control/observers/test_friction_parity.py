@@ -26,6 +26,7 @@ _BRANCHES = {
 }
 
 
+@pytest.mark.untraced
 def test_one_step_equals_the_reference_from_random_states() -> None:
     draw = np.random.default_rng(16)
     reached: Counter[str] = Counter()
@@ -41,6 +42,7 @@ def test_one_step_equals_the_reference_from_random_states() -> None:
     assert min(reached.values()) >= _OFTEN, reached.most_common()
 
 
+@pytest.mark.untraced
 @pytest.mark.parametrize("counts", [1024, 4096])
 def test_ten_thousand_steps_of_a_ride_equal_the_reference(counts: int) -> None:
     rig = bench(*STEADY, 'observer.kind="friction_kalman"', f"encoder.counts_per_rev={counts}")
