@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 from tools import manifest
 from tools.boards import BOARDS_HELP, FOLDER, read_boards, released
@@ -47,6 +48,26 @@ def compile_boards(folder: Path, boards: Path = FOLDER) -> dict[str, dict[str, i
     ]
     linked = re.findall(r"Linking C executable (\w+)\.elf", said)
     return dict(zip(linked, uses[-len(linked) :], strict=True))
+
+
+def check_data(boards: Path) -> None:
+    """Let CMake check every board.h in a folder of boards, as it does before it builds them.
+
+    Raises
+    ------
+    ConfigError
+        If one is wrong, in CMake's words.
+    RuntimeError
+        If CMake is missing.
+    """
+    if shutil.which("cmake") is None:
+        raise RuntimeError(f"no cmake here, which checks the board.h: {INSTALL}")
+    folders = ";".join(str(file.resolve().parent) for file in sorted(boards.glob("*/board.h")))
+    command = ["cmake", f"-DFOLDERS={folders}", "-P", "cmake/boards.cmake"]
+    done = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode:
+        said = " ".join(done.stderr.partition("Call Stack")[0].split())
+        raise ConfigError(said.partition(" (message): ")[2] or said)
 
 
 def release(

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
-from tools import brown_out, manifest
+from tools import artefact, brown_out, manifest
 from tools.boards import BOARDS_HELP, FOLDER, read_boards, released
 from tools.brown_out import OptionError
 from tools.record import RECORD_ADDRESS, image
@@ -89,8 +89,16 @@ def _arguments() -> argparse.Namespace:
     return asked
 
 
+def _data(asked: argparse.Namespace) -> Path:
+    """Return the board's board.h."""
+    data: Path = asked.boards / asked.board.name / "board.h"
+    return data
+
+
 def _pieces(asked: argparse.Namespace, folder: Path) -> list[Piece]:
     pieces = []
+    if asked.only == "record" and not manifest.built_of(_data(asked), asked.firmware):
+        artefact.check_data(asked.boards)  # its number is in the record
     if asked.only in (None, "record"):
         rig = load_rig(asked.rig, asked.sets)
         kept = folder / "record.bin"
@@ -121,8 +129,7 @@ def _program(asked: argparse.Namespace) -> list[Piece]:
         raise ConfigError(f"{missing[0]}: there is no such file. Say `make firmware` first, or --firmware.")
     build = ["python", "-m", "tools.artefact", str(asked.firmware)]
     build += [] if asked.boards == FOLDER else ["--boards", str(asked.boards)]
-    data = asked.boards / asked.board.name / "board.h"
-    manifest.check_images(data, [part.file for part in parts], f"`{shlex.join(build)}`")
+    manifest.check_images(_data(asked), [part.file for part in parts], f"`{shlex.join(build)}`")
     return parts
 
 

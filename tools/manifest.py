@@ -69,6 +69,15 @@ def check_images(data: Path, images: Iterable[Path], build: str) -> None:
             raise ConfigError(f"{image}: it is not the one that {NAME} says. Build it anew: {build}.")
 
 
+def built_of(data: Path, folder: Path) -> bool:
+    """Return whether the manifest in a folder of images says that its board's were built of this board.h."""
+    try:
+        known = _read(folder / NAME, data.parent.name, "")
+    except ConfigError:
+        return False
+    return known.get("board_h_sha256") == sha256(data)
+
+
 def _read(manifest: Path, board: str, build: str) -> dict[str, Any]:
     """Return the board's part of a manifest."""
     try:

@@ -9,6 +9,7 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
+from tests.target.build import needed
 from tests.tools.board_images import DAC, write_images
 from tools import flash
 from tools.boards import FOLDER, read_boards, released
@@ -89,9 +90,13 @@ def test_supply_that_is_not_known_or_not_the_rigs_is_refused(
 
 
 @pytest.mark.parametrize("board", released(read_boards()))
-def test_every_board_that_is_released_can_be_flashed(board: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_board_that_is_released_can_be_flashed(
+    board: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_images(tmp_path, board, FOLDER / board / "board.h")
+    options = ("bench-serial", "--firmware", str(tmp_path), "--only", "record", "--dry-run")
     supply = ("--set", "amplifier.supply_V=24", "--supply-V", "24") if board in pwm_boards() else ()
-    assert run(monkeypatch, board, "bench-serial", *supply, "--only", "record", "--dry-run") == 0
+    assert run(monkeypatch, board, *options, *supply) == 0
 
 
 def pwm_boards() -> list[str]:
@@ -107,9 +112,11 @@ def test_board_with_a_program_of_its_own_cannot_be_flashed(
 
 
 def test_pwm_board_without_its_supply_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(monkeypatch, PWM, "bench-serial", "--only", "record", "--dry-run") == 2
+    write_images(tmp_path, PWM, FOLDER / PWM / "board.h")
+    options = ("--firmware", str(tmp_path), "--only", "record", "--dry-run")
+    assert run(monkeypatch, PWM, "bench-serial", *options) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: --supply-V: ")
 
@@ -182,7 +189,37 @@ def test_image_of_another_board_h_is_refused(
     assert said.out == ""
     assert said.err.startswith(f"error: {data}: mine.code.bin was built of another board.h")
     assert said.err.endswith(f"anew: `python -m tools.artefact {tmp_path} --boards '{boards}'`.\n")
-    assert run(monkeypatch, *folders, "mine", "bench-serial", "--only", "record", "--dry-run") == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "said"),
+    [
+        ("BOARD_NUMBER 199", "BOARD_NUMBER 7", "BOARD_NUMBER is 7. Write a number from 128 to 2147483647."),
+        ("ENABLE PB15", "ENABLE PB14", None),
+    ],
+)
+def test_record_alone_is_written_for_a_board_whose_data_cmake_takes(
+    line: str,
+    other: str,
+    said: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    needed("cmake")
+    boards = tmp_path / "my boards"
+    data = write_board(boards)
+    write_images(tmp_path, "mine", data)
+    data.write_text(data.read_text("utf-8").replace(line, other), "utf-8")
+    folders = ("--boards", str(boards), "--firmware", str(tmp_path))
+    code = run(monkeypatch, *folders, "mine", "bench-serial", "--only", "record", "--dry-run")
+    words = capsys.readouterr().err
+    if said is None:
+        assert (code, words) == (0, "")
+    else:
+        assert code == 2
+        assert words.startswith(f"error: {data}: {said}")
+        assert len(words.splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -242,7 +279,8 @@ def test_folder_without_a_board_is_one_line(
     [
         (["bench-serial", "--firmware", "nowhere"], 2, "make firmware"),
         (["bench-1khz"], 2, "Start from bench-serial"),
-        (["bench-serial", "--only", "record", "--by", "pyocd"], 3, "pip install pyocd"),
+        (["bench-serial", "--only", "record", "--firmware", "nowhere"], 3, "no cmake here, which checks"),
+        (["bench-serial", "--only", "brown-out", "--by", "pyocd"], 3, "pip install pyocd"),
     ],
 )
 def test_mistake_is_one_line_with_its_remedy(
