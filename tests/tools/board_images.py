@@ -21,3 +21,11 @@ def write_images(folder: Path, board: str = DAC, data: Path = FOLDER / DAC / "bo
         image_of.write_bytes(image_of.name.encode())
     known = {"boards": {board: manifest.entry(data, images, {})}}
     (folder / manifest.NAME).write_text(json.dumps(known))
+
+
+def write_own_board(folder: Path, name: str = "mine") -> Path:
+    """Write a board of one's own; return its board.h."""
+    text = (FOLDER / DAC / "board.h").read_text("utf-8")
+    (folder / name).mkdir(parents=True)
+    (folder / name / "board.h").write_text(text.replace("BOARD_NUMBER 3", "BOARD_NUMBER 199"), "utf-8")
+    return folder / name / "board.h"

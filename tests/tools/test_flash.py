@@ -9,8 +9,7 @@ import pytest
 
 from dcmp_hil import load_rig
 from dcmp_hil.errors import ConfigError
-from tests.target.build import needed
-from tests.tools.board_images import DAC, write_images
+from tests.tools.board_images import DAC, write_images, write_own_board
 from tools import flash
 from tools.boards import FOLDER, read_boards, released
 from tools.flash import CODE_ADDRESS, VECTORS_ADDRESS, Piece, commands
@@ -156,18 +155,10 @@ def test_dry_run_shows_what_would_be_done(
 # ----------------------------------------------------------------- the image is that of today's board.h
 
 
-def write_board(folder: Path, name: str = "mine") -> Path:
-    """Write a board of one's own; return its board.h."""
-    text = (FOLDER / DAC / "board.h").read_text("utf-8")
-    (folder / name).mkdir(parents=True)
-    (folder / name / "board.h").write_text(text.replace("BOARD_NUMBER 3", "BOARD_NUMBER 199"), "utf-8")
-    return folder / name / "board.h"
-
-
 def test_board_of_another_folder_is_flashed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_images(tmp_path, "mine", write_board(tmp_path / "boards"))
+    write_images(tmp_path, "mine", write_own_board(tmp_path / "boards"))
     folders = ("--boards", str(tmp_path / "boards"), "--firmware", str(tmp_path))
     assert run(monkeypatch, *folders, "mine", "bench-serial", "--dry-run") == 0
     assert f"-w {tmp_path}/mine.code.bin" in capsys.readouterr().out
@@ -180,7 +171,7 @@ def test_image_of_another_board_h_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     boards = tmp_path / "my boards"
-    data = write_board(boards)
+    data = write_own_board(boards)
     write_images(tmp_path, "mine", data)
     data.write_text(data.read_text("utf-8").replace("ENABLE PB15", "ENABLE PC4"), "utf-8")
     folders = ("--boards", str(boards), "--firmware", str(tmp_path))
@@ -189,37 +180,6 @@ def test_image_of_another_board_h_is_refused(
     assert said.out == ""
     assert said.err.startswith(f"error: {data}: mine.code.bin was built of another board.h")
     assert said.err.endswith(f"anew: `python -m tools.artefact {tmp_path} --boards '{boards}'`.\n")
-
-
-@pytest.mark.parametrize(
-    ("line", "other", "said"),
-    [
-        ("BOARD_NUMBER 199", "BOARD_NUMBER 7", "BOARD_NUMBER is 7. Write a number from 128 to 2147483647."),
-        ("ENABLE PB15", "ENABLE PB14", None),
-    ],
-)
-def test_record_alone_is_written_for_a_board_whose_data_cmake_takes(
-    line: str,
-    other: str,
-    said: str | None,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    needed("cmake")
-    boards = tmp_path / "my boards"
-    data = write_board(boards)
-    write_images(tmp_path, "mine", data)
-    data.write_text(data.read_text("utf-8").replace(line, other), "utf-8")
-    folders = ("--boards", str(boards), "--firmware", str(tmp_path))
-    code = run(monkeypatch, *folders, "mine", "bench-serial", "--only", "record", "--dry-run")
-    words = capsys.readouterr().err
-    if said is None:
-        assert (code, words) == (0, "")
-    else:
-        assert code == 2
-        assert words.startswith(f"error: {data}: {said}")
-        assert len(words.splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -264,7 +224,7 @@ def test_folder_without_a_board_is_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     if text is not None:
-        write_board(tmp_path).write_text(text)
+        write_own_board(tmp_path).write_text(text)
     assert run(monkeypatch, "mine", "bench-serial", "--boards", str(tmp_path), "--dry-run") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: --boards: ")
