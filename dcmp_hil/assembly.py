@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from dcmp_hil.config.compared_observers import OPTION, column_name, compared_sections
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.stage_factory import controller_of, observer_of
 from dcmp_hil.config.variation import expected_variation
@@ -12,6 +13,7 @@ from dcmp_hil.control import controllers
 from dcmp_hil.control.friction_feedforward import FrictionFeedforward
 from dcmp_hil.control.observers.super_twisting import SuperTwisting, watch_floor
 from dcmp_hil.control.predictor import LinearPredictor
+from dcmp_hil.control.shadow import Shadow, Shadows
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
 from dcmp_hil.fault_hooks import NO_FAULTS
@@ -31,7 +33,7 @@ from dcmp_hil.telemetry.further_columns import joined
 from dcmp_hil.telemetry.recorder import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from dcmp_hil.config import Rig
     from dcmp_hil.control.controllers import Controller
@@ -168,6 +170,25 @@ def make_controller(rig: Rig) -> Controller:
     """Make the controller that `[controller]` asks for."""
     context = controllers.ControllerContext(rig.model.values(), rig.period)
     return controller_of(rig.controller, context, rig.plugin_folders)
+
+
+def make_shadows(rig: Rig, kinds: Iterable[str], controller: Controller) -> Shadows:
+    """Make the observers that only run beside the loop; each has the gains of its rules.
+
+    They share a controller of the package, which keeps no state, so that its present gains count.
+
+    Raises
+    ------
+    ConfigError
+        If one is none, or the rig is none for it.
+    """
+    shared = None if isinstance(rig.controller, Custom) else controller
+    made = []
+    for kind, section in compared_sections(rig, kinds).items():
+        beside = rig.model_copy(update={"observer": section})
+        observer = observer_of(section, rig.observer_context, rig.plugin_folders, OPTION)
+        made.append(Shadow(column_name(kind), observer, make_predictor(beside, observer), shared))
+    return Shadows(made)
 
 
 def make_predictor(rig: Rig, observer: Observer) -> Predictor:

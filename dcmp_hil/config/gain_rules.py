@@ -62,14 +62,18 @@ def loops(rig: RigTables) -> list[LinearLoop]:
     return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
 
 
+def observer_limits(rig: RigTables) -> ObserverLimits:
+    """Return the facts of a rig that limit the gains of an observer."""
+    torque = rig.model.ku_rad_s2_V * rig.amplifier.limit
+    return ObserverLimits(rig.encoder.count, rig.supervisor.velocity_limit_rad_s, torque)
+
+
 def _fault(rig: RigTables) -> Callable[[], str] | None:
     """Return a function that describes the fault, None without one; only it computes the margins."""
     if rig.supervisor.monitors != "all":
         return None
-    torque = rig.model.ku_rad_s2_V * rig.amplifier.limit
-    limits = ObserverLimits(rig.encoder.count, rig.supervisor.velocity_limit_rad_s, torque)
     if isinstance(rig.observer, ObserverSettings) and (
-        fault := rig.observer.fault(rig.observer_context, limits)
+        fault := rig.observer.fault(rig.observer_context, observer_limits(rig))
     ):
         return partial(str, fault)
     for loop in loops(rig):

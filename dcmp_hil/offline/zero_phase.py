@@ -105,6 +105,33 @@ def zero_phase(
     return ZeroPhase(velocity, disturbance)
 
 
+def low_pass(values: NDArray[np.float64], corner: float) -> NDArray[np.float64] | None:
+    """Return evenly spaced values through the same filter, forwards and backwards.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    corner
+        Cycles a sample.
+
+    Returns
+    -------
+    ndarray or None
+        Shape (n,); None where there are too few values, or the filter has no such corner.
+
+    Raises
+    ------
+    ConfigError
+        If scipy is missing.
+    """
+    fits = _FREQUENCY_MIN_PER_SAMPLE <= corner <= _FREQUENCY_MAX_PER_SAMPLE
+    if not fits or len(values) <= _PADDING_SAMPLES_MIN:
+        return None
+    pad = min(len(values) - 1, max(_PADDING_SAMPLES_MIN, round(_PADDING_PERIODS / corner)))
+    return _both_ways(values, corner, pad)
+
+
 def _even(time: NDArray[np.float64], period: float) -> NDArray[np.float64]:
     """Return an even grid from the first to the last row."""
     return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)

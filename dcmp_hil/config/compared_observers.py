@@ -1,0 +1,102 @@
+"""Lists of observers to be compared: their names, and the table of each in a rig."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, cast
+
+from dcmp_hil.config.formatting import printable
+from dcmp_hil.config.gain_rules import observer_limits
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.sections import Custom
+from dcmp_hil.config.suggestions import for_unknown_kind
+from dcmp_hil.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from dcmp_hil.config.kinds import ObserverSection
+    from dcmp_hil.config.rig import Rig
+    from dcmp_hil.control.observers.settings import ObserverSettings
+
+OPTION = "--compare"
+_COMPARED_MAX = 8  # observers
+_CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+_OTHER_CHARACTERS = re.compile(r"[^a-z0-9]+")
+
+
+def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...]:
+    """Return the kinds that lists such as ``kalman,derivative`` name, in their order.
+
+    Parameters
+    ----------
+    texts
+        A list each: kinds of `[observer]`, or `module:Class`.
+    option
+        What they were given by, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If one is no kind, or is there twice; with every one that is.
+    """
+    kinds = [kind_named(part) for text in texts for part in text.split(",")]
+    faults = [
+        f'{option}: got "{printable(kind)}"; {for_unknown_kind("observer", kind)}'
+        for kind in kinds
+        if not is_kind(kind)
+    ]
+    columns = [column_name(kind) for kind in kinds]
+    twice = dict.fromkeys(kind for kind in kinds if is_kind(kind) and columns.count(column_name(kind)) > 1)
+    faults += [f"{option}: {kind} is given twice. Leave one out." for kind in twice]
+    if len(kinds) > _COMPARED_MAX:
+        faults.append(f"{option}: {len(kinds)} observers at once; at most {_COMPARED_MAX}. Leave some out.")
+    if faults:
+        raise ConfigError(*faults)
+    return tuple(kinds)
+
+
+def kind_named(text: str) -> str:
+    """Return an observer's kind as a rig spells it."""
+    text = text.strip()
+    return text if ":" in text else text.lower().replace("-", "_")
+
+
+def is_kind(text: str) -> bool:
+    """Return whether a text is a kind of `[observer]`, or `module:Class`."""
+    return bool(_CLASS.fullmatch(text)) or (text != "custom" and text in KINDS["observer"])
+
+
+def column_name(kind: str) -> str:
+    """Return what columns call an observer: its kind, or module and class with all else as underscores."""
+    if ":" not in kind:
+        return kind
+    return f"own_{_OTHER_CHARACTERS.sub('_', kind.lower()).strip('_')}"
+
+
+def compared_sections(rig: Rig, kinds: Iterable[str], option: str = OPTION) -> dict[str, ObserverSection]:
+    """Return the table of each observer that runs beside the loop of a rig, by its kind.
+
+    The one that closes the loop is left out: it runs already. The others have the gains of their rules.
+
+    Raises
+    ------
+    ConfigError
+        If the rig is none for one of them; with every one that is.
+    """
+    found: dict[str, ObserverSection] = {}
+    faults: list[str] = []
+    for kind in observer_kinds(kinds, option):
+        if kind == rig.observer.kind:
+            continue
+        if ":" in kind:
+            found[kind] = Custom.model_validate({"kind": kind})
+            continue
+        section = cast("ObserverSettings", KINDS["observer"][kind].model_validate({"kind": kind}))
+        fault = section.fault(rig.observer_context, observer_limits(rig))
+        if fault:
+            faults.append(f"{option} {kind}: {fault}")
+        found[kind] = section
+    if faults:
+        raise ConfigError(*faults)
+    return found
