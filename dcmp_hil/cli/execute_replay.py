@@ -10,13 +10,17 @@ from rich.table import Table
 from rich.text import Text
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.comparison_table import comparison_table
 from dcmp_hil.cli.outputs import free_name, json_place, try_places, write_each
+from dcmp_hil.comparison import compare_in_file
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import read_recording, replay, write_csv, write_rrd
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from dcmp_hil.cli.replay_variants import Variant
+    from dcmp_hil.comparison import ObserverComparison
     from dcmp_hil.offline import ColumnOptions, Figures, LoggedSignals, ReplayResult, ReplaySettings
 
 _COLUMN_WIDTH_MIN = 9  # characters
@@ -56,7 +60,7 @@ def execute(
     columns: ColumnOptions,
     settings: ReplaySettings,
     outputs: Outputs,
-    variants: Sequence[tuple[str, ReplaySettings]] = (),
+    variants: Sequence[tuple[Variant[Any], ReplaySettings]] = (),
 ) -> None:
     """Replay a file, then write and show what came of it.
 
@@ -67,7 +71,7 @@ def execute(
     outputs
         What is written.
     variants
-        Other settings to be compared, each with its keys in one text.
+        To be compared, each with its settings.
 
     Raises
     ------
@@ -77,8 +81,11 @@ def execute(
     csv, rrd = _targets(file, outputs)
     recording = read_recording(file, columns)
     result = replay(recording, settings)
-    compared = {label: _compared(label, recording, other, result) for label, other in variants}
-    document = _figures(result, compared)
+    compared = {
+        variant.label: _compared(variant.label, recording, other, result) for variant, other in variants
+    }
+    comparison = _side_by_side(settings, result, compared, variants)
+    document = _figures(result, compared, comparison)
     if rrd is not None and outputs.rrd is None and (reason := _no_library()):
         console.warn(f"no {rrd}: {reason}")
         rrd = None
@@ -94,7 +101,10 @@ def execute(
     if outputs.json == "-":
         console.write_json("-", document)
     else:
-        console.out.print(_table(file, settings, result, compared))
+        unlisted = {one.label: compared[one.label] for one, _ in variants if not one.observer}
+        console.out.print(_table(file, settings, result, unlisted))
+        if comparison is not None:
+            console.out.print(comparison_table(comparison))
     for path in written:
         if path != json:
             console.note(f"wrote {path}")
@@ -124,6 +134,24 @@ def _compared(
     return dataclasses.replace(result, notes=(*result.notes, _OWN_REFERENCE_NOTE))
 
 
+def _side_by_side(
+    settings: ReplaySettings,
+    result: ReplayResult,
+    compared: Mapping[str, ReplayResult],
+    variants: Sequence[tuple[Variant[Any], ReplaySettings]],
+) -> ObserverComparison | None:
+    """Return the comparison of the observers of a list; None where no list was given."""
+    listed = {
+        variant.observer: (other, compared[variant.label]) for variant, other in variants if variant.observer
+    }
+    if not listed:
+        return None
+    comparison = compare_in_file({settings.kind: (settings, result), **listed})
+    for note in comparison.notes:
+        console.note(note)
+    return comparison
+
+
 def _tell(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> None:
     """Note the columns that were read, and the remarks of each replay."""
     for column in result.recording.columns:
@@ -136,7 +164,9 @@ def _tell(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> None:
                 console.note(f"{label}: {sentence}")
 
 
-def _figures(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> dict[str, Any]:
+def _figures(
+    result: ReplayResult, compared: Mapping[str, ReplayResult], comparison: ObserverComparison | None
+) -> dict[str, Any]:
     """Return what `--json` writes: the figures, what was read from where, and the notes."""
     columns = [str(column) for column in result.recording.columns]
     found = {**result.figures.to_dict(), "columns": columns, "notes": list(result.notes)}
@@ -144,7 +174,9 @@ def _figures(result: ReplayResult, compared: Mapping[str, ReplayResult]) -> dict
         {"set": label, **other.figures.to_dict(), "notes": list(other.notes)}
         for label, other in compared.items()
     ]
-    return {**found, "compared": others} if others else found
+    if others:
+        found["compared"] = others
+    return {**found, "comparison": comparison.to_dict()} if comparison else found
 
 
 def _targets(file: Path, outputs: Outputs) -> tuple[Path | None, Path | None]:

@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
 from dcmp_hil.cli import console, unrepeated_changes
+from dcmp_hil.cli.comparison_table import comparison_table
 from dcmp_hil.cli.outputs import json_place, try_places, write_each
-from dcmp_hil.cli.replay_options import keys_of
+from dcmp_hil.cli.repeated_run import figures_of, repetitions, side_by_side
 from dcmp_hil.common.number_range import number
-from dcmp_hil.config import load_table
 from dcmp_hil.errors import ConfigError, IncompleteError
 from dcmp_hil.recording import export
-from dcmp_hil.recording.compare import compare
 from dcmp_hil.recording.reader import read_run, recording_in
-from dcmp_hil.recording.reexecute import reexecute
 from dcmp_hil.recording.untrusted import named_in
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from dcmp_hil.cli.execute_replay import Outputs
-    from dcmp_hil.cli.replay_options import ReplayOptions, Variant
-    from dcmp_hil.config import Rig
-    from dcmp_hil.recording.compare import Comparison
+    from dcmp_hil.cli.repeated_run import Repetition
+    from dcmp_hil.cli.replay_options import ReplayOptions
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.recording.reexecute import Reexecution
 
 _COLUMN_WIDTH_MIN = 9  # characters
-_MAY_CHANGE = ("observer", "controller", "model")
 
 
 @np.errstate(all="ignore")  # a file may hold any number, and what comes of it is written as it is
@@ -74,6 +69,43 @@ def replay_own(file: Path, options: ReplayOptions, outputs: Outputs, *, trust: b
         If the recording cannot be read, an option says what a run knows itself, or an override is none of
         observer, controller or model.
     """
+    run, start = _opened(file, options, outputs)
+    keys, json_file = options.keys(), json_place(outputs.json)
+    base, variants = repetitions(run, options, keys, start, trust=trust)
+    others = {one.label: one.again for one in variants}
+    comparison = side_by_side(run, base, variants, start, trust=trust)
+    figures = figures_of(base, variants)
+    if comparison is not None:
+        figures["comparison"] = comparison.to_dict()
+    written, faults = write_each(
+        [
+            (outputs.csv, partial(export.reexecution_to_csv, run, base.again, others)),
+            (outputs.rrd, partial(export.reexecution_to_rrd, run, base.again, others)),
+            (json_file, lambda path: console.write_json(str(path), figures)),
+        ]
+    )
+    if outputs.json == "-":
+        console.write_json("-", figures)
+    else:
+        console.out.print(_table(run, base, variants))
+        if comparison is not None:
+            console.out.print(comparison_table(comparison))
+    for path in written:
+        if path != json_file:
+            console.note(f"wrote {path}")
+    _end(run, faults)
+    if not keys:
+        _check_repeated(run, base.again)
+
+
+def _opened(file: Path, options: ReplayOptions, outputs: Outputs) -> tuple[RecordedRun, float]:
+    """Return the recording, and the time from its first period at which the figures begin, s.
+
+    Raises
+    ------
+    ConfigError, IncompleteError
+        If an option is none of a run's, a file cannot be written, or there is nothing to replay.
+    """
     refused = options.refused_of_a_run()
     if refused:
         raise ConfigError(
@@ -81,54 +113,17 @@ def replay_own(file: Path, options: ReplayOptions, outputs: Outputs, *, trust: b
             "sampling and rig. Leave it out. Other gains: --observer, --mu0, --M, --L1, --L2, --f0, --ku, "
             "--set KEY=VALUE."
         )
-    json_file = json_place(outputs.json)
-    places = {"--csv": outputs.csv, "--rrd": outputs.rrd, "--json": json_file}
+    places = {"--csv": outputs.csv, "--rrd": outputs.rrd, "--json": json_place(outputs.json)}
     try_places(places, {"the recording": recording_in(file)}, force=outputs.force)
     run = _read(file)
     if not len(run.rows):
         raise _incomplete(run) if run.damage else ConfigError(f"{run.path}: no period is in it.")
     _tell_faults(run)
-    keys, start = options.keys(), options.figures.get("start") or 0.0
+    start = options.figures.get("start") or 0.0
     lasted = float(run.rows[-1, 0] - run.rows[0, 0])
     if start and not 0.0 <= start < lasted:
         raise ConfigError(f"--from: got {number(start)} s; the run lasts {lasted:.4g} s. Write less.")
-    again, others = _repetitions(run, options, keys, trust=trust)
-    result = compare(run, again, start)
-    compared = {label: compare(run, other, start) for label, other in others.items()}
-    figures = _figures(result, again, compared, others)
-    written, faults = write_each(
-        [
-            (outputs.csv, partial(export.reexecution_to_csv, run, again, others)),
-            (outputs.rrd, partial(export.reexecution_to_rrd, run, again, others)),
-            (json_file, lambda path: console.write_json(str(path), figures)),
-        ]
-    )
-    if outputs.json == "-":
-        console.write_json("-", figures)
-    else:
-        console.out.print(_table(run, keys, result, compared))
-    for path in written:
-        if path != json_file:
-            console.note(f"wrote {path}")
-    _end(run, faults)
-    if not keys:
-        _check_repeated(run, again)
-
-
-def _repetitions(
-    run: RecordedRun, options: ReplayOptions, keys: Sequence[str], *, trust: bool
-) -> tuple[Reexecution, dict[str, Reexecution]]:
-    """Run it again with the overrides of `keys`, and with each variant; tell what is not repeated of it."""
-    rig = _changed(run.rig, keys, trust=trust)
-    again = reexecute(run, rig, pinned=keys_of(keys), trust=trust)
-    others = {
-        variant.label: _repeated(run, variant, keys_of((*keys, *variant.overrides)), trust=trust)
-        for variant in options.compared(rig or run.rig, _MAY_CHANGE)
-    }
-    unrepeated_changes.tell(" ".join(keys) or str(run.path), again.unrepeated)
-    for label, other in others.items():
-        unrepeated_changes.tell(label, other.unrepeated)
-    return again, others
+    return run, start
 
 
 def _check_repeated(run: RecordedRun, again: Reexecution) -> None:
@@ -145,18 +140,6 @@ def _check_repeated(run: RecordedRun, again: Reexecution) -> None:
             f"{run.path}: {len(refused)} of its changes cannot be repeated: the warnings say which. What was "
             "made of it is without them."
         )
-
-
-def _repeated(
-    run: RecordedRun, variant: Variant[Rig], pinned: Collection[str], *, trust: bool
-) -> Reexecution:
-    """Run a variant of `--compare`; a fault names it."""
-    rig = variant.tables.in_folder(run.rig.folder if trust else None)
-    try:
-        return reexecute(run, rig, pinned=pinned, trust=trust)
-    except ConfigError as error:
-        faults = (f"--compare {variant.label}: {fault}" for fault in error.faults)
-        raise ConfigError(*faults) from error.__cause__
 
 
 def _read(file: Path) -> RecordedRun:
@@ -197,66 +180,23 @@ def _tell_faults(run: RecordedRun) -> None:
         )
 
 
-def _changed(rig: Rig, overrides: Sequence[str], *, trust: bool) -> Rig | None:
-    """Return the rig with other gains; None for the same.
-
-    Classes that the overrides name are looked for where the recording says only if it is trusted.
-    """
-    if not overrides:
-        return None
-    for override in overrides:
-        if override.partition(".")[0] not in _MAY_CHANGE:
-            raise ConfigError(
-                f"--set {override}: what was measured stays as it was; only keys of "
-                f"{', '.join(_MAY_CHANGE)} can be changed afterwards."
-            )
-    table = json.loads(json.dumps(rig.model_dump(mode="python", exclude_unset=True), default=str))
-    return load_table(table, overrides, rig.folder if trust else None)
-
-
-def _figures(
-    result: Comparison,
-    again: Reexecution,
-    compared: Mapping[str, Comparison],
-    repeated: Mapping[str, Reexecution],
-) -> dict[str, Any]:
-    """Return what `--json` writes: the figures of the run and of each repetition."""
-    lines = {line.name: {"recorded": line.recorded, "again": line.again} for line in result.figures}
-    found = {
-        "identical": result.identical,
-        "rows": result.rows,
-        "unrepeated_changes": unrepeated_changes.document(again.unrepeated),
-        **lines,
-    }
-    others = [
-        {
-            "set": label,
-            "identical": other.identical,
-            "unrepeated_changes": unrepeated_changes.document(repeated[label].unrepeated),
-            **{line.name: line.again for line in other.figures},
-        }
-        for label, other in compared.items()
-    ]
-    return {**found, "compared": others} if others else found
-
-
-def _table(
-    run: RecordedRun, overrides: Sequence[str], result: Comparison, compared: Mapping[str, Comparison]
-) -> Table:
-    said = "every number is the same, to the bit" if result.identical else "the numbers differ"
+def _table(run: RecordedRun, base: Repetition, variants: Sequence[Repetition]) -> Table:
+    """Return the table of the run, its repetition, and the variants that no list of observers names."""
+    others = [one for one in variants if not one.observer]
+    said = "every number is the same, to the bit" if base.result.identical else "the numbers differ"
     table = Table(
-        title=Text(f"{run.path}: {result.rows} periods again: {said}"),
+        title=Text(f"{run.path}: {base.result.rows} periods again: {said}"),
         title_justify="left",
         box=None,
         padding=(0, 2, 0, 0),
     )
-    least = _COLUMN_WIDTH_MIN if compared else None  # a label folds, a number does not
+    least = _COLUMN_WIDTH_MIN if others else None  # a label folds, a number does not
     table.add_column("", no_wrap=True)
     table.add_column("recorded", justify="right", overflow="fold")
-    for label in (" ".join(overrides) or "again", *compared):
+    for label in (base.label or "again", *(one.label for one in others)):
         table.add_column(Text(label), justify="right", style="bold", overflow="fold", min_width=least)
-    again = [[line.again for line in one.figures] for one in (result, *compared.values())]
-    for line, *values in zip(result.figures, *again, strict=True):
+    again = [[line.again for line in one.result.figures] for one in (base, *others)]
+    for line, *values in zip(base.result.figures, *again, strict=True):
         table.add_row(line.name, _number(line.recorded), *map(_number, values))
     return table
 

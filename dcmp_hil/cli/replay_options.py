@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from dcmp_hil.cli.replay_variants import Variant, variants_of
 from dcmp_hil.common.number_range import number
-from dcmp_hil.config import change_rig, load_tables
+from dcmp_hil.config import load_tables
+from dcmp_hil.config.compared_observers import kind_named
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.offline import ColumnOptions, ReplaySettings
 from dcmp_hil.offline.settings import PERIOD_RANGE
@@ -32,24 +34,6 @@ _OPTION_KEYS = {  # short options for keys of a rig
     "ku": "model.ku_rad_s2_V",
 }
 _FILE_TABLES = ("observer", "model", "encoder")
-
-
-class Variant(NamedTuple, Generic[T]):
-    """A variant of `--compare`.
-
-    Parameters
-    ----------
-    label
-        Its overrides in one text.
-    overrides
-        `key=value` with the full key.
-    tables
-        The rig with them.
-    """
-
-    label: str
-    overrides: tuple[str, ...]
-    tables: T
 
 
 @dataclass(frozen=True)
@@ -105,38 +89,8 @@ class ReplayOptions:
         )
 
     def compared(self, tables: T, allowed: Sequence[str]) -> list[Variant[T]]:
-        """Return each variant of `--compare`.
-
-        Parameters
-        ----------
-        tables
-            What `--set` has left of the rig.
-        allowed
-            Tables whose keys a variant may name.
-
-        Raises
-        ------
-        ConfigError
-            If a variant is there twice, or cannot be made.
-        """
-        found: dict[str, Variant[T]] = {}
-        for text in self.variants:
-            keys = tuple(_full_key(part.strip()) for part in text.split(";") if part.strip())
-            label = "; ".join(keys)
-            if label in found:
-                raise ConfigError(f"--compare {text}: given twice. Leave one out.")
-            if not keys or any(key.partition(".")[0] not in allowed for key in keys):
-                raise ConfigError(
-                    f"--compare {text}: what was measured stays as it was. Write KEY=VALUE with a key of "
-                    f"{', '.join(allowed[:-1])} or {allowed[-1]}, such as observer.kind=paper; a semicolon "
-                    "parts several keys."
-                )
-            try:
-                found[label] = Variant(label, keys, change_rig(tables, keys))
-            except ConfigError as error:
-                faults = (f"--compare {fault.removeprefix('--set ')}" for fault in error.faults)
-                raise ConfigError(*faults) from None
-        return list(found.values())
+        """Return each variant of `--compare`; see `variants_of`."""
+        return variants_of(self.variants, tables, allowed, full_key)
 
     def refused_of_a_run(self) -> list[str]:
         """Return the options that were given and mean nothing for a run's own recording."""
@@ -178,8 +132,8 @@ class ReplayOptions:
         """
         return self._settings(self._tables)
 
-    def compared_settings(self) -> list[tuple[str, ReplaySettings]]:
-        """Return each variant of `--compare` of a file: its keys in one text, and its settings.
+    def compared_settings(self) -> list[tuple[Variant[RigTables], ReplaySettings]]:
+        """Return each variant of `--compare` of a file, and its settings.
 
         Raises
         ------
@@ -187,7 +141,7 @@ class ReplayOptions:
             If a variant is there twice, or cannot be made.
         """
         variants = self.compared(self._tables, _FILE_TABLES[:2])
-        return [(variant.label, self._settings(variant.tables)) for variant in variants]
+        return [(variant, self._settings(variant.tables)) for variant in variants]
 
     def _settings(self, tables: RigTables) -> ReplaySettings:
         input_at = self.file.get("input_at")
@@ -203,7 +157,8 @@ class ReplayOptions:
     @property
     def _gains(self) -> dict[str, Any]:
         """Return the short options that were given."""
-        return _set({**self.gains, "observer": _kind(self.gains.get("observer"))})
+        observer = self.gains.get("observer")
+        return _set({**self.gains, "observer": observer and kind_named(observer)})
 
     @property
     def _named(self) -> bool:
@@ -258,18 +213,13 @@ def _set(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def _full_key(override: str) -> str:
+def full_key(override: str) -> str:
     """Return an override with the key that a short option stands for, if it names one."""
     key, equals, value = override.partition("=")
     key, value = key.strip(), value.strip()
     if key == "observer" and equals:
-        value = str(_kind(value))
+        value = kind_named(value)
     return f"{_OPTION_KEYS.get(key, key)}{equals}{value}"
-
-
-def _kind(observer: str | None) -> str | None:
-    """Return an observer's kind as a rig spells it."""
-    return observer if observer is None or ":" in observer else observer.lower().replace("-", "_")
 
 
 def _toml(value: Any) -> str:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.stage_factory import observer_of
 from dcmp_hil.platform.clock import MonotonicClock
+from dcmp_hil.values import Sample
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
-    from dcmp_hil.control.observers import Observer
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dcmp_hil.config.kinds import ObserverSection
+    from dcmp_hil.control.observers import Observer, ObserverContext
     from dcmp_hil.platform.clock import Clock
-    from dcmp_hil.values import Sample
 
-_ROUNDS = 7
+STANDARD = "super_twisting"
+"""The observer that costs are compared with."""
+_ROUNDS, _SAMPLES_MAX = 7, 2000
 _NS_PER_US = 1e3
 
 
@@ -56,3 +65,30 @@ def cost_per_step(
             known = best[name]
             best[name] = took if known is None else min(known, took)
     return best
+
+
+def observer_costs(
+    sections: Mapping[str, ObserverSection],
+    context: ObserverContext,
+    folders: Sequence[Path],
+    columns: tuple[NDArray[np.float64], ...],
+) -> dict[str, float | None]:
+    """Return the cost of a step of each observer, and of the one that all are compared with, us.
+
+    Parameters
+    ----------
+    sections
+        Their tables, by name.
+    context, folders
+        As for `observer_of`.
+    columns
+        Time (s), position (rad), voltage applied (V), shape (n,); the first 2000 rows are used.
+    """
+
+    def maker(section: ObserverSection) -> Callable[[], Observer]:
+        return lambda: observer_of(section, context, folders)
+
+    rows = zip(*(column[:_SAMPLES_MAX].tolist() for column in columns), strict=True)
+    standard = cast("ObserverSection", KINDS["observer"][STANDARD].model_validate({"kind": STANDARD}))
+    makers = {name: maker(section) for name, section in {STANDARD: standard, **sections}.items()}
+    return cost_per_step(makers, [Sample(*row) for row in rows])

@@ -11,7 +11,7 @@ import numpy as np
 from dcmp_hil.offline.zero_phase import low_pass
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -57,12 +57,13 @@ def even_pieces(
     return pieces
 
 
-def lag(pieces: Sequence[tuple[Column, Column]], period: float) -> float | None:
+def lag(pieces: Sequence[tuple[Column, Column]], period: float, cutoff: float) -> float | None:
     """Return by how much a signal is late: the shift with the least mean square difference.
 
     The differences for whole samples are found by cross-correlation (by FFT); a parabola through the least
     and its neighbours gives the fraction (Jacovitti and Scarano, "Discrete time techniques for time delay
-    estimation", IEEE Trans. Signal Processing 41(2), 1993).
+    estimation", IEEE Trans. Signal Processing 41(2), 1993). Signal and reference pass the same zero-phase
+    low-pass first, which moves neither: the steps of an encoder would pull the shift towards themselves.
 
     Parameters
     ----------
@@ -70,13 +71,21 @@ def lag(pieces: Sequence[tuple[Column, Column]], period: float) -> float | None:
         Signal and reference, evenly sampled, of equal shape (n,); one shift for all pieces.
     period
         s.
+    cutoff
+        Hz, of the Butterworth filter of third order, forwards and backwards.
 
     Returns
     -------
     float or None
-        s, positive where the signal is late; None where no shift within 0.25 s makes the two alike: the
-        reference hardly changes, or the signal is noise.
+        s, positive where the signal is late; None where no shift within 0.25 s makes the two alike (the
+        reference hardly changes, or the signal is noise), or the sampling is too slow for the corner.
+
+    Raises
+    ------
+    ConfigError
+        If scipy is missing.
     """
+    pieces = [(slow, true) for pair in pieces for slow, true in _smooth(pair, cutoff * period)]
     most = round(_LAG_MAX_S / period)
     most = min([most, *(int(_SHIFT_SHARE_MAX * len(signal)) for signal, _ in pieces)])
     if not pieces or most < 1:
@@ -93,6 +102,13 @@ def lag(pieces: Sequence[tuple[Column, Column]], period: float) -> float | None:
     if not curvature > 0.0:
         return None
     return float(best - most + 0.5 * (before - behind) / curvature) * period
+
+
+def _smooth(pair: tuple[Column, Column], corner: float) -> Iterator[tuple[Column, Column]]:
+    """Yield signal and reference below the corner; nothing where there is no such filter."""
+    signal, reference = (low_pass(column, corner) for column in pair)
+    if signal is not None and reference is not None:
+        yield signal, reference
 
 
 def _squares(signal: Column, reference: Column, most: int) -> Column:

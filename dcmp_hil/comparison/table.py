@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from dcmp_hil.comparison.cost import STANDARD
 from dcmp_hil.comparison.signal_figures import even_pieces, lag, noise, rms, variation
 from dcmp_hil.errors import ConfigError
 
@@ -17,17 +18,14 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-STANDARD = "super_twisting"
-"""The observer that costs are compared with."""
 CUTOFF_HZ = 15.0
 """Corner of the zero-phase filters, Hz."""
+_FILTERED = ("velocity_lag_s", "velocity_noise_rad_s", "disturbance_noise_rad_s2")
 _FROM_COLUMNS = (
     "velocity_error_rms_rad_s",
     "disturbance_error_rms_rad_s2",
-    "velocity_lag_s",
-    "velocity_noise_rad_s",
-    "disturbance_noise_rad_s2",
     "voltage_tv_V_s",
+    *_FILTERED,
 )
 
 
@@ -80,7 +78,7 @@ class ObserverFigures:
     velocity_error_rms_rad_s: float | None
     disturbance_error_rms_rad_s2: float | None
     velocity_lag_s: float | None
-    """Shift with the least RMS difference from the reference; positive: late."""
+    """Shift with the least RMS difference from the reference below the cut-off; positive: late."""
     velocity_noise_rad_s: float | None
     """RMS of what is above the cut-off."""
     disturbance_noise_rad_s2: float | None
@@ -115,6 +113,10 @@ class ObserverComparison:
     window_s: tuple[float, float] | None
     observers: tuple[ObserverFigures, ...]
     notes: tuple[str, ...] = ()
+
+    def with_notes(self, *notes: str) -> ObserverComparison:
+        """Return the same with further notes; empty ones are left out."""
+        return replace(self, notes=(*self.notes, *filter(None, notes)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values under the names above, for JSON."""
@@ -207,16 +209,25 @@ def _figures(
     return {
         "velocity_error_rms_rad_s": rms(velocity - reference.velocity[used]),
         "disturbance_error_rms_rad_s2": rms(disturbance - reference.disturbance[used]),
-        "velocity_lag_s": lag([(signal, true) for signal, true in pairs], period),
-        "velocity_noise_rad_s": _noise([piece[0] for piece in pieces], rows, notes),
-        "disturbance_noise_rad_s2": _noise([piece[1] for piece in pieces], rows, notes),
         "voltage_tv_V_s": None if one.voltage is None else variation(rows.time[used], one.voltage[used]),
+        **_filtered([(signal, true) for signal, true in pairs], pieces, rows, notes),
     }
 
 
-def _noise(pieces: Sequence[Column], rows: ComparedRows, notes: dict[str, None]) -> float | None:
+def _filtered(
+    pairs: Sequence[tuple[Column, Column]],
+    pieces: Sequence[Sequence[Column]],
+    rows: ComparedRows,
+    notes: dict[str, None],
+) -> dict[str, float | None]:
+    """Return the figures that need a filter; None without scipy, which is an extra, and a note."""
+    period, cutoff = rows.period, rows.cutoff
     try:
-        return noise(pieces, rows.period, rows.cutoff)
-    except ConfigError as error:  # scipy is an extra
-        notes[f"No noise figures: {error}"] = None
-        return None
+        return {
+            "velocity_lag_s": lag(pairs, period, cutoff),
+            "velocity_noise_rad_s": noise([velocity for velocity, _ in pieces], period, cutoff),
+            "disturbance_noise_rad_s2": noise([disturbance for _, disturbance in pieces], period, cutoff),
+        }
+    except ConfigError as error:
+        notes[f"No figures of lag and noise: {error}"] = None
+        return dict.fromkeys(_FILTERED)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 from dcmp_hil.config.formatting import printable
 from dcmp_hil.config.gain_rules import observer_limits
+from dcmp_hil.config.overrides import apply_overrides
 from dcmp_hil.config.rig import KINDS
 from dcmp_hil.config.sections import Custom
 from dcmp_hil.config.suggestions import for_unknown_kind
@@ -77,7 +78,8 @@ def column_name(kind: str) -> str:
 def compared_sections(rig: Rig, kinds: Iterable[str], option: str = OPTION) -> dict[str, ObserverSection]:
     """Return the table of each observer that runs beside the loop of a rig, by its kind.
 
-    The one that closes the loop is left out: it runs already. The others have the gains of their rules.
+    The one that closes the loop is left out: it runs already. The others are as `--set observer.kind=...`
+    makes them: keys that both kinds have keep what the rig says, all others go by their rules.
 
     Raises
     ------
@@ -89,12 +91,13 @@ def compared_sections(rig: Rig, kinds: Iterable[str], option: str = OPTION) -> d
     for kind in observer_kinds(kinds, option):
         if kind == rig.observer.kind:
             continue
+        table = rig.model_dump(include={"observer"}, exclude_unset=True)
+        apply_overrides(table, [f"observer.kind={kind}"])
         if ":" in kind:
-            found[kind] = Custom.model_validate({"kind": kind})
+            found[kind] = Custom.model_validate(table["observer"])
             continue
-        section = cast("ObserverSettings", KINDS["observer"][kind].model_validate({"kind": kind}))
-        fault = section.fault(rig.observer_context, observer_limits(rig))
-        if fault:
+        section = cast("ObserverSettings", KINDS["observer"][kind].model_validate(table["observer"]))
+        if fault := section.fault(rig.observer_context, observer_limits(rig)):
             faults.append(f"{option} {kind}: {fault}")
         found[kind] = section
     if faults:

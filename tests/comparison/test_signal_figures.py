@@ -20,26 +20,42 @@ def swing(t: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("late", [0.0, 1e-3, 0.35e-3, 7.25e-3, 60.5e-3, 0.2, -2.5e-3])
 def test_a_known_delay_is_found_to_a_microsecond(late: float) -> None:
-    found = known(lag([(swing(TIME - late), swing(TIME))], PERIOD))
+    found = known(lag([(swing(TIME - late), swing(TIME))], PERIOD, 15.0))
     assert found == pytest.approx(late, abs=1e-6)
 
 
 def test_noise_hardly_changes_the_lag() -> None:
     signal = swing(TIME - 12.3e-3) + 0.05 * RNG.standard_normal(len(TIME))
-    assert known(lag([(signal, swing(TIME))], PERIOD)) == pytest.approx(12.3e-3, abs=3e-3)
+    assert known(lag([(signal, swing(TIME))], PERIOD, 15.0)) == pytest.approx(12.3e-3, abs=3e-3)
+
+
+def test_the_steps_of_an_encoder_do_not_pull_the_lag_towards_themselves() -> None:
+    count, bandwidth = 2.0 * np.pi / 4096, 60.0
+    position = -1.6 * np.cos(0.5 * TIME)
+    counted = np.round(position / count) * count
+    slow = np.zeros(len(TIME))
+    for k in range(1, len(TIME)):
+        rate = (counted[k] - counted[k - 1]) / PERIOD
+        slow[k] = slow[k - 1] + (1.0 - np.exp(-bandwidth * PERIOD)) * (rate - slow[k - 1])
+    found = known(lag([(slow[500:], 0.8 * np.sin(0.5 * TIME[500:]))], PERIOD, 15.0))
+    assert found == pytest.approx(1.0 / bandwidth, abs=1e-3)
 
 
 def test_pieces_have_one_lag_together() -> None:
     signal, true = swing(TIME - 4.5e-3), swing(TIME)
     cuts = [slice(0, 3000), slice(3500, 8000)]
-    assert known(lag([(signal[cut], true[cut]) for cut in cuts], PERIOD)) == pytest.approx(4.5e-3, abs=1e-6)
+    assert known(lag([(signal[cut], true[cut]) for cut in cuts], PERIOD, 15.0)) == pytest.approx(
+        4.5e-3, abs=1e-6
+    )
 
 
 def test_a_low_pass_of_first_order_is_late_by_its_time_constant() -> None:
     slow, bandwidth = np.zeros(len(TIME)), 60.0
     for k in range(1, len(TIME)):
         slow[k] = slow[k - 1] + (1.0 - np.exp(-bandwidth * PERIOD)) * (swing(TIME[k]) - slow[k - 1])
-    assert known(lag([(slow[1000:], swing(TIME)[1000:])], PERIOD)) == pytest.approx(1.0 / bandwidth, abs=1e-3)
+    assert known(lag([(slow[1000:], swing(TIME)[1000:])], PERIOD, 15.0)) == pytest.approx(
+        1.0 / bandwidth, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -49,12 +65,12 @@ def test_a_low_pass_of_first_order_is_late_by_its_time_constant() -> None:
 )
 def test_there_is_no_lag_where_no_shift_makes_the_two_alike(true: np.ndarray) -> None:
     signal = swing(TIME) if true[5] == swing(TIME - 0.6)[5] else RNG.standard_normal(len(TIME))
-    assert lag([(signal, true)], PERIOD) is None
+    assert lag([(signal, true)], PERIOD, 15.0) is None
 
 
 def test_there_is_no_lag_of_nothing() -> None:
-    assert lag([], PERIOD) is None
-    assert lag([(np.ones(3), np.ones(3))], PERIOD) is None
+    assert lag([], PERIOD, 15.0) is None
+    assert lag([(np.ones(3), np.ones(3))], PERIOD, 15.0) is None
 
 
 def test_noise_is_what_lies_above_the_corner() -> None:
@@ -100,4 +116,4 @@ def test_lost_samples_are_bridged_evenly() -> None:
     begins = np.arange(len(kept)) == 0
     ((signal, true),) = even_pieces(time, (swing(time - 3e-3), swing(time)), everything, begins, PERIOD)
     assert len(signal) == round((time[-1] - time[0]) / PERIOD) + 1
-    assert known(lag([(signal, true)], PERIOD)) == pytest.approx(3e-3, abs=2e-5)
+    assert known(lag([(signal, true)], PERIOD, 15.0)) == pytest.approx(3e-3, abs=2e-5)

@@ -83,8 +83,9 @@ def test_without_scipy_there_is_no_noise_and_a_note_says_so(monkeypatch: pytest.
     monkeypatch.setattr("dcmp_hil.comparison.signal_figures.low_pass", missing)
     found = compare_observers(ROWS, [LOOP, BESIDE], TRUE, {})
     assert {one.velocity_noise_rad_s for one in found.observers} == {None}
-    assert known(found.observers[0].velocity_lag_s) > 0.0
-    assert found.notes == ("No noise figures: It needs scipy. Install it: pip install scipy",)
+    assert {one.velocity_lag_s for one in found.observers} == {None}
+    assert known(found.observers[0].velocity_error_rms_rad_s) > 0.0
+    assert found.notes == ("No figures of lag and noise: It needs scipy. Install it: pip install scipy",)
 
 
 def test_rows_that_do_not_count_leave_nothing() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from dcmp_hil.config import change_rig
 from dcmp_hil.config.compared_observers import column_name, compared_sections, observer_kinds
-from dcmp_hil.control.observers.kalman import KalmanSettings
 from dcmp_hil.errors import ConfigError
 from tests.helpers import bench
 
@@ -44,11 +44,13 @@ def test_names_of_columns_are_lower_case_and_of_one_word() -> None:
     assert column_name("My_Lab.rig:Mine2") == "own_my_lab_rig_mine2"
 
 
-def test_those_beside_the_loop_have_the_gains_of_their_rules() -> None:
-    rig = bench("observer.kind=super_twisting", "observer.mu0_rad_s=70")
-    found = compared_sections(rig, ["super_twisting", "kalman"])
-    assert list(found) == ["kalman"]
-    assert found["kalman"] == KalmanSettings(kind="kalman")
+def test_those_beside_the_loop_are_as_another_kind_makes_them() -> None:
+    rig = bench("observer.mu0_rad_s=70", "observer.L1_1_s=6")
+    found = compared_sections(rig, ["super_twisting", "kalman", "paper"])
+    assert list(found) == ["kalman", "paper"]
+    for kind, section in found.items():
+        assert section == change_rig(rig, [f"observer.kind={kind}"]).observer
+    assert found["paper"].model_dump()["L1_1_s"] == 6.0
 
 
 def test_every_observer_that_does_not_fit_the_rig_is_named() -> None:
