@@ -87,6 +87,7 @@ HELP = {
             "dcmp-hil replay recording.csv --ku 5.4",
             "dcmp-hil replay log.csv --position deg --position-unit deg --inertia 0.16",
             "dcmp-hil replay runs/20260130T101500Z-bench-1khz --compare mu0=90",
+            "dcmp-hil replay recording.csv --ku 5.4 --compare kalman,derivative",
         ),
     ),
     "export": CommandHelp(

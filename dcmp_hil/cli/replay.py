@@ -110,7 +110,8 @@ def replay(  # noqa: PLR0913 - typer reads the options from the signature
         typer.Option(
             "--compare",
             metavar="KEY=VALUE",
-            help="Also with this key, side by side; of a run with controller.* too. Repeatable.",
+            help="Also with these observers (kalman,derivative), or with this key; of a run controller.*, "
+            "too. Repeatable.",
             rich_help_panel=_OBSERVER,
         ),
     ] = None,

@@ -40,6 +40,7 @@ TYPED = (
     ("run --set observer.kind=pa\t", "<run><--set><observer.kind=paper>"),
     ("run --fault wire.dr\t:p=0.2,a\t3s", "<run><--fault><wire.drop:p=0.2,at=3s>"),
     ("run --set loop.ra\t500 --no-c\t", "<run><--set><loop.rate_hz=500><--no-control>"),
+    ("replay own.toml --compare ext\t,der\t", "<replay><own.toml><--compare><extended_state,derivative>"),
     ("check bench-1\t", "<check><bench-1khz>"),
     ("run own\t", "<run><own.toml>"),
 )
@@ -112,6 +113,9 @@ def ask(scripts: dict[str, Path], tmp_path: Path) -> Callable[[str], list[str]]:
         ("replay --observer ", _OBSERVERS),
         ("replay data.csv --compare model.k", ["model.ku_rad_s2_V="]),
         ("replay data.csv --compare supervisor", []),
+        ("replay data.csv --compare fr", ["friction_kalman"]),
+        ("replay data.csv --compare kalman,", [f"kalman,{kind}" for kind in _OBSERVERS]),
+        ("replay data.csv --compare kalman,paper,der", ["kalman,paper,derivative"]),
         ("conform --link ", ["cobs", "slcan", "can"]),
         ("completion ", [*SHELLS]),
         ("nonsense ", []),

@@ -18,7 +18,7 @@ _dcmp_hil() {
         compopt -o filenames 2> /dev/null
     fi
     COMPREPLY=("${COMPREPLY[@]/#/$head}")
-    if [[ $option == --fault || ( ${#COMPREPLY[@]} -eq 1 && ${COMPREPLY[0]} == *= ) ]]; then
+    if [[ $option == --fault || $option == --compare || ( ${#COMPREPLY[@]} -eq 1 && ${COMPREPLY[0]} == *= ) ]]; then
         compopt -o nospace 2> /dev/null # more may follow: the value of a key, the keys of a fault
     fi
     if [[ $COMP_WORDBREAKS == *=* ]]; then breaks+='='; fi

@@ -15,6 +15,11 @@ function __dcmp_hil_find
                 echo $head(string replace -- $kind '' $word)
             end
         end
+    else if string match -q -- '*,*' $current; and not string match -qr -- '[=:]' $current
+        set -l head (string replace -r '[^,]*$' '' -- $current)
+        for word in (__dcmp_hil_words $argv[1] | string match -v -- '*=*')
+            echo $head$word
+        end
     else if string match -q -- '*=*' $current; or string match -q -- '*:*' $current
         __dcmp_hil_words $argv[1]
     else

@@ -98,7 +98,7 @@ def _values(command: str, parameter: Any) -> Values:
     }
     if metavar in words:
         return Values(tuple(words[metavar]()))
-    if parameter.opts[0] == "--observer":
+    if parameter.opts[0] == "--observer" or metavar == "OBSERVERS":
         return Values(_kinds("observer"))
     return Values(_choices(parameter.type_descriptor.annotation))
 
@@ -118,9 +118,9 @@ def _keys(command: str, option: str) -> list[str]:
     """Return `KEY=` of each key that an option takes, and `KEY=VALUE` of those with a list of values."""
     schema, found = rig_schema(), dict[str, list[Any]]()
     _collect(schema, "", schema["$defs"], found)
+    words = [*_kinds("observer")] if option == "--compare" else []
     tables = _COMPARED if option == "--compare" else tuple(schema["properties"])
     names = _changed_in_a_run() if command == "set" else found.keys()
-    words = []
     for key, values in found.items():
         if key in names and key.partition(".")[0] in tables:
             words.append(f"{key}=")

@@ -39,7 +39,7 @@ _dcmp_hil_place() {
 
 # Leaves in `found` what the current word `$1` can become; `$2` is the option, if its value is written behind `=`.
 _dcmp_hil_find() {
-    local word rest current=$1 head=''
+    local word rest current=$1 head='' list=''
     found=()
     if [[ -n $2 ]]; then
         _dcmp_hil_follows "$command" "$2"
@@ -53,11 +53,16 @@ _dcmp_hil_find() {
     if [[ $current == *:*,* ]]; then # a fault: its later keys are those of its kind
         head=${current%,*},
         current=${current%%:*}:${current##*,}
+    elif [[ $current == *,* && $current != *[=:]* ]]; then # a list of observers
+        list=${current%,*},
+        current=${current##*,}
     fi
     for word in "${reply[@]}"; do
         rest=${word#"$current"}
         if [[ $word != "$current"* || $rest == *[=:]?* || ( -z $rest && $word == *= ) ]]; then continue; fi
+        if [[ -n $list && $word == *= ]]; then continue; fi
         if [[ -n $head ]]; then word=$head${word#*:}; fi
+        word=$list$word
         found+=("$word")
     done
 }

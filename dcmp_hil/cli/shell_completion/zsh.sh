@@ -8,7 +8,7 @@ _dcmp_hil() {
         compset -P 1 '*='
     fi
     _dcmp_hil_find "$current" "$option"
-    if [[ $option == --fault ]]; then # its keys may follow
+    if [[ $option == --fault || $option == --compare ]]; then # its keys may follow, or the next of a list
         compadd -S '' -- "${(@)found}"
     else
         compadd -S '' -- "${(@M)found:#*=}"
