@@ -25,6 +25,7 @@ def run(
     sinks: Sequence[Sink | SinkMaker] = (),
     faults: Iterable[object] = (),
     clear: bool = False,
+    compare: Sequence[str] = (),
 ) -> Result:
     """Run a rig and return its cycles as columns and its figures.
 
@@ -51,6 +52,10 @@ def run(
         wire and of the firmware need `backend.kind = "sim-board"`.
     clear
         Whether a fault of an earlier run that waits for a person is cleared; see `Session`.
+    compare
+        Kinds of observers, such as ``("kalman", "derivative")``, that run beside the loop on the same samples
+        and act on nothing. Their estimates are further columns (``velocity_kalman_rad_s``);
+        `dcmp_hil.comparison.compare_result` makes the table.
 
     Returns
     -------
@@ -69,7 +74,14 @@ def run(
         If the device or the way to it fails; with `.result`.
     """
     session = Session(
-        rig, duration=duration, fast=fast, window_from=window_from, sinks=sinks, faults=faults, clear=clear
+        rig,
+        duration=duration,
+        fast=fast,
+        window_from=window_from,
+        sinks=sinks,
+        faults=faults,
+        clear=clear,
+        compare=compare,
     )
     try:
         session.run()

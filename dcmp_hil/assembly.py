@@ -143,17 +143,25 @@ class Laws(NamedTuple):
     further: FurtherColumns
 
 
-def make_laws(rig: Rig) -> Laws:
+def make_laws(rig: Rig, compare: Iterable[str] = ()) -> Laws:
     """Make observer and controller; what they tell of themselves is known before telemetry begins.
+
+    Parameters
+    ----------
+    rig
+        To be run.
+    compare
+        Observers that run beside the loop; see `make_shadows`.
 
     Raises
     ------
     ConfigError
-        If a class named `module:Class` cannot be found or made, or its diagnosis has names that are none.
+        If a class named `module:Class` cannot be found or made, its diagnosis has names that are none, or an
+        observer to compare with does not fit.
     """
-    observer = make_observer(rig)
-    diagnosis = diagnosis_of(observer, rig.observer.kind)
-    return Laws(observer, make_controller(rig), joined([diagnosis]))
+    observer, controller = make_observer(rig), make_controller(rig)
+    sources = diagnosis_of(observer, rig.observer.kind), make_shadows(rig, compare, controller)
+    return Laws(observer, controller, joined(sources))
 
 
 def make_observer(rig: Rig) -> Observer:

@@ -57,6 +57,10 @@ class Result:
         What was changed while it went on, in words.
     motor_gain
         What the probe found of the motor; None without a probe.
+    compared
+        Kinds of observers that were asked for beside the loop.
+    last_columns
+        With those, where columns were not kept: the columns of the last cycles, as many as the ring holds.
     """
 
     rig: Rig
@@ -75,3 +79,5 @@ class Result:
     troubles: tuple[str, ...] = ()
     changes: tuple[str, ...] = ()
     motor_gain: MotorGain | None = None
+    compared: tuple[str, ...] = ()
+    last_columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)

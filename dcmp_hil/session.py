@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble, make_laws
+from dcmp_hil.config.compared_observers import observer_kinds
 from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import ConfigError, DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
@@ -69,6 +70,8 @@ class Session:
     clear
         Whether a fault that waits for a person is cleared: STOP by a person, the amplifier's own protection,
         what the board found wrong with itself. Set it when a person has looked, never by default.
+    compare
+        Kinds of observers that run beside the loop, on the same samples; a text may be a list of them.
 
     Raises
     ------
@@ -90,6 +93,7 @@ class Session:
         control: CommandInterface | None = None,
         faults: Iterable[object] | Faults = (),
         clear: bool = False,
+        compare: Sequence[str] = (),
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         _check_times(length, window_from, fast=fast)
@@ -103,7 +107,8 @@ class Session:
         self._realtime = None if fast else RealTime(rig.timing)
         self._host = host_facts()
         statistics = Statistics(rig.period, window_from)
-        laws = make_laws(rig)
+        laws = make_laws(rig, compare)
+        self._compared = observer_kinds(compare)
         self._apart: TelemetryProcess | None = None
         self._figures = SummarySink(statistics, MemorySink() if keep_columns else None)
         if fast:
@@ -258,10 +263,11 @@ class Session:
 
     def result(self) -> Result:
         """Return the result so far, of a complete or an interrupted run."""
+        columns = self._figures.columns()
         return Result(
             rig=self.rig,
             summary=self._figures.statistics.summary(self._realtime_factor),
-            columns=self._figures.columns(),
+            columns=columns,
             events=self._figures.events(),
             periods=self._recorder.written,
             dropped=self._apart.dropped if self._apart else self._recorder.dropped,
@@ -275,6 +281,8 @@ class Session:
             troubles=tuple(self._figures.troubles),
             changes=tuple(getattr(self._stages.changes, "made", ())),
             motor_gain=self._stages.supervisor.motor_gain,
+            compared=self._compared,
+            last_columns=self._recorder.last_columns() if self._compared and not columns else {},
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -18,7 +19,7 @@ _JUDGED = {
 }
 
 
-def comparison_table(comparison: ObserverComparison) -> Table:
+def comparison_table(comparison: ObserverComparison) -> Group:
     """Return a table with a column for each observer; what is known of none of them has no row."""
     first, last = comparison.window_s or (0.0, 0.0)
     judged = _JUDGED[comparison.reference]
@@ -42,7 +43,7 @@ def comparison_table(comparison: ObserverComparison) -> Table:
         if any(value is not None for value in values):
             what, _, unit = cells[0]
             table.add_row(what, *("none" if value is None else f"{value:.3g}" for value in values), unit)
-    return table
+    return Group("", table)
 
 
 def _lines(one: ObserverFigures, comparison: ObserverComparison) -> list[tuple[str, float | None, str]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.cli import console
+from dcmp_hil.cli.comparison_table import comparison_table
 from dcmp_hil.cli.library_output import split_stderr
 from dcmp_hil.cli.orphaned_run import Unattended
 from dcmp_hil.cli.outputs import json_place, try_places
@@ -18,6 +19,7 @@ from dcmp_hil.cli.run_folder import RunFolder
 from dcmp_hil.cli.run_sinks import dashboard, dashboard_replacing, recording, status_line
 from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.cli.viewer import chosen
+from dcmp_hil.comparison import compare_result
 from dcmp_hil.config import Rig, load_rig
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.control.references.table import Table
@@ -34,15 +36,17 @@ from dcmp_hil.telemetry.rerun import viewer as window
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dcmp_hil.comparison import ObserverComparison
     from dcmp_hil.fault_hooks import Faults
     from dcmp_hil.live.command_process import CommandProcess
+    from dcmp_hil.result import Result
     from dcmp_hil.telemetry.rerun.sink import Viewer
     from dcmp_hil.telemetry.sink_factories import SinkMaker
 
 INCOMPLETE_ENDED_BY = "recording_incomplete"
 """How a run ended that went well, and is not wholly in its recording."""
 _BOARD_OVERRIDE = "backend.kind=sim-board"
-_PICTURE_DURATION_MAX_S = 600.0  # s: a longer run is not kept in memory for a picture
+_KEPT_DURATION_MAX_S = 600.0  # s: a longer run is not kept in memory for a picture or a comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,7 @@ class Options:
     faults: tuple[str, ...] = ()
     control: bool = True
     clear: bool = False
+    compare: tuple[str, ...] = ()
     force: bool = False
     source: str = ""  # the rig's file or name
 
@@ -127,12 +132,13 @@ def _session(
         fast=options.fast,
         window_from=options.window_from,
         sinks=_makers(rig, options, folder),
-        keep_columns=folder is not None and 0 < length <= _PICTURE_DURATION_MAX_S and _wants_picture(options),
+        keep_columns=0 < length <= _KEPT_DURATION_MAX_S and _wants_columns(options, folder),
         stop=stop,
         warn=console.warn,
         control=_control(rig, options, folder),
         faults=faults,
         clear=options.clear,
+        compare=options.compare,
     )
 
 
@@ -191,9 +197,29 @@ def _makers(rig: Rig, options: Options, folder: RunFolder | None) -> list[SinkMa
     return makers
 
 
+def _wants_columns(options: Options, folder: RunFolder | None) -> bool:
+    """Return whether a run is compared, or leaves a picture: without a viewer it does."""
+    return bool(options.compare) or (folder is not None and _wants_picture(options))
+
+
 def _wants_picture(options: Options) -> bool:
     """Return whether a run without a viewer leaves a picture."""
     return options.viewer == "none"
+
+
+def _compared(result: Result) -> ObserverComparison | None:
+    """Compare the observers, if that was asked for; without a table, everything else is kept and shown."""
+    try:
+        comparison = compare_result(result)
+    except Exception as error:  # noqa: BLE001 - numbers of any kind may come of a run that tripped
+        console.warn(f"The observers could not be compared: {type(error).__name__}: {error}.")
+        return None
+    if comparison is not None:
+        for note in comparison.notes:
+            console.note(note)
+        if not result.columns:
+            console.note("of a run as long as this one, the last cycles are compared")
+    return comparison
 
 
 def _conclude(session: Session, options: Options, folder: RunFolder | None, end: _End) -> str:
@@ -205,7 +231,8 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
         ended_by = end.ended_by
         if kept is not None and not kept.complete and end.error is None and end.code == 0:
             ended_by = INCOMPLETE_ENDED_BY
-        document = run_document(session.rig, options.note, options.faults, result, ended_by, kept)
+        comparison = _compared(result)
+        document = run_document(session.rig, options.note, options.faults, result, ended_by, kept, comparison)
         missing = folder.write(session.rig, document, end.error) if folder else []
         incomplete = kept.why if kept is not None and kept.why else "".join(missing[:1])
         missing += write_json(options.json_file, document)
@@ -214,10 +241,12 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
             console.write_json("-", document)
         else:
             console.out.print(summary_table(session.rig, result, ended_by))
+            if comparison is not None:
+                console.out.print(comparison_table(comparison))
         for sentence in missing:
             console.warn(sentence)
         if folder is not None:
-            if not cut_off:  # drawing takes seconds, and the end was asked for
+            if not cut_off and _wants_picture(options):  # drawing takes seconds, and the end was asked for
                 folder.draw(result)
             folder.tell(options.record, live=options.viewer != "none")
     return incomplete

@@ -43,6 +43,7 @@ HELP = {
             "dcmp-hil run bench-1khz --duration 10s --set loop.rate_hz=500",
             "dcmp-hil run --fast --duration 30s --viewer none --json figures.json",
             "dcmp-hil run --set backend.kind=serial --set backend.port=/dev/ttyACM0",
+            "dcmp-hil run --fast --compare friction_kalman,kalman,derivative",
             "dcmp-hil run --fast --fault wire.drop:p=0.2,at=3s,for=1s",
         ),
     ),

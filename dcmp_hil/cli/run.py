@@ -77,6 +77,14 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
     no_control: Annotated[
         bool, typer.Option("--no-control", help="Do not listen for `dcmp-hil set`, `stop` and `panel`.")
     ] = False,
+    compare: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--compare",
+            metavar="OBSERVERS",
+            help="Run these observers beside the loop, and compare them: kalman,derivative. Repeatable.",
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Run a rig: read the encoder, estimate, control, write the voltage, stream to Rerun.
@@ -97,6 +105,7 @@ def run(  # noqa: PLR0913, PLR0917 - a command has that many options
         faults=tuple(faults or ()),
         control=not no_control,
         clear=clear,
+        compare=tuple(compare or ()),
         force=force,
     )
     raise typer.Exit(execute(rig, overrides or (), options))

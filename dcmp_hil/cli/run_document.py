@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dcmp_hil.cli.recording_check import RecordingCheck
+    from dcmp_hil.comparison import ObserverComparison
     from dcmp_hil.config import Rig
     from dcmp_hil.result import Result
 
@@ -24,6 +25,7 @@ def run_document(
     result: Result,
     ended_by: str,
     kept: RecordingCheck | None = None,
+    comparison: ObserverComparison | None = None,
 ) -> dict[str, Any]:
     """Return what `--json` writes; `kept` is None where nothing is recorded, or it was not looked at."""
     return {
@@ -39,6 +41,7 @@ def run_document(
         "device_end": result.device_end and result.device_end._asdict(),
         "overruns": result.overruns,
         "outliers": result.outliers,
+        "comparison": comparison and comparison.to_dict(),
         "motor_gain": result.motor_gain and result.motor_gain.document(),
         "troubles": result.troubles,
         "changes": result.changes,

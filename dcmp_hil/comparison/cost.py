@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 STANDARD = "super_twisting"
 """The observer that costs are compared with."""
-_ROUNDS, _SAMPLES_MAX = 7, 2000
+_ROUNDS, _SAMPLES_MAX = 25, 500  # short ones: one of them is not interrupted
 _NS_PER_US = 1e3
 
 
@@ -82,7 +82,7 @@ def observer_costs(
     context, folders
         As for `observer_of`.
     columns
-        Time (s), position (rad), voltage applied (V), shape (n,); the first 2000 rows are used.
+        Time (s), position (rad), voltage applied (V), shape (n,); the first 500 rows are used.
     """
 
     def maker(section: ObserverSection) -> Callable[[], Observer]:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config import Rig
     from dcmp_hil.config.kinds import ObserverSection
+    from dcmp_hil.result import Result
 
     Column = NDArray[np.float64]
     Columns = Mapping[str, Column]
@@ -51,6 +52,22 @@ class ObserverBeside(NamedTuple):
     disturbance: Column
     demand: Column | None
     section: ObserverSection
+
+
+def compare_result(result: Result) -> ObserverComparison | None:
+    """Compare the observers of a run that was asked to `compare`, in the window of its summary.
+
+    Returns
+    -------
+    ObserverComparison or None
+        None where nothing was compared, or there was no period. Where the columns of the run were not kept,
+        over its last cycles.
+    """
+    columns = result.columns or result.last_columns
+    if not result.compared or not columns or not len(columns["time_s"]):
+        return None
+    beside = shadows_in(result.rig, columns, result.compared)
+    return compare_in_run(result.rig, columns, beside, result.summary.window_s[0])
 
 
 def shadows_in(rig: Rig, columns: Columns, kinds: Iterable[str]) -> dict[str, ObserverBeside]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.observers.settings import ObserverSettings
 
 OPTION = "--compare"
-_COMPARED_MAX = 8  # observers
+_COMPARED_MAX, _NAME_CHARS_MAX = 8, 60  # observers; of a name, which a column has between quantity and unit
 _CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 _OTHER_CHARACTERS = re.compile(r"[^a-z0-9]+")
 
@@ -32,7 +32,7 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
     Parameters
     ----------
     texts
-        A list each: kinds of `[observer]`, or `module:Class`.
+        A list each, or one of them: kinds of `[observer]`, or `module:Class`.
     option
         What they were given by, for messages.
 
@@ -41,6 +41,7 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
     ConfigError
         If one is no kind, or is there twice; with every one that is.
     """
+    texts = (texts,) if isinstance(texts, str) else texts
     kinds = [kind_named(part) for text in texts for part in text.split(",")]
     faults = [
         f'{option}: got "{printable(kind)}"; {for_unknown_kind("observer", kind)}'
@@ -50,6 +51,12 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
     columns = [column_name(kind) for kind in kinds]
     twice = dict.fromkeys(kind for kind in kinds if is_kind(kind) and columns.count(column_name(kind)) > 1)
     faults += [f"{option}: {kind} is given twice. Leave one out." for kind in twice]
+    faults += [
+        f"{option}: {printable(kind)}: a name of more than {_NAME_CHARS_MAX} characters, which is that of a "
+        "column, too. Import the class in a module of a shorter name."
+        for kind in kinds
+        if len(column_name(kind)) > _NAME_CHARS_MAX
+    ]
     if len(kinds) > _COMPARED_MAX:
         faults.append(f"{option}: {len(kinds)} observers at once; at most {_COMPARED_MAX}. Leave some out.")
     if faults:

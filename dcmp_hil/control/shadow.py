@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.values import Event, EventKind
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     Values = tuple[float, float, float, float]
     """Position (rad), velocity (rad/s), disturbance (rad/s2), voltage that it would demand (V)."""
 
-_NOTHING = (math.nan, math.nan, math.nan, math.nan)
+_NO_VALUES = (math.nan, math.nan, math.nan, math.nan)
 
 
 class Shadow:
@@ -47,10 +49,10 @@ class Shadow:
         self._observer, self._predictor, self._controller = observer, predictor, controller
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the values, with their units; without a controller there is no demand."""
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, with their units; without a controller there is no demand."""
         estimate = f"position_{self.name}_rad", f"velocity_{self.name}_rad_s"
-        disturbance, demand = f"disturbance_{self.name}_rad_s2", f"voltage_demand_{self.name}_v"
+        disturbance, demand = f"disturbance_{self.name}_rad_s2", f"voltage_demand_{self.name}_V"
         return (*estimate, disturbance, *((demand,) if self._controller else ()))
 
     def update(self, sample: Sample, reference: Reference, voltage: float) -> Values:
@@ -66,7 +68,7 @@ class Shadow:
             V, that was really sent.
         """
         if self.failure:
-            return _NOTHING
+            return _NO_VALUES
         try:
             estimate = self._observer.update(sample)
             demand = math.nan
@@ -81,7 +83,7 @@ class Shadow:
             self.failure = self._why_not_finite(sample, estimate)
         except Exception as error:  # noqa: BLE001 - after any exception of a shadow, the run goes on
             self.failure = f"it raised {type(error).__name__}: {error}"
-        return _NOTHING
+        return _NO_VALUES
 
     def _why_not_finite(self, sample: Sample, estimate: Estimate) -> str:
         """Return the reason of a class of the user's own, if it states one."""
@@ -91,7 +93,7 @@ class Shadow:
 
 
 class Shadows:
-    """The shadows of a run, in their order, and their values as columns.
+    """The shadows of a run as further columns of its cycles, asked for when the command has left.
 
     Parameters
     ----------
@@ -100,27 +102,37 @@ class Shadows:
 
     Attributes
     ----------
-    columns
-        Names of the values of `update`.
-    warnings
-        A sentence for each that gave up.
+    names
+        Of the values.
     """
 
     def __init__(self, shadows: Sequence[Shadow] = ()) -> None:
-        self._shadows = [(shadow, len(shadow.columns)) for shadow in shadows]
-        self.columns = tuple(name for shadow in shadows for name in shadow.columns)
-        self.warnings: list[str] = []
+        self._shadows = [(shadow, len(shadow.names)) for shadow in shadows]
+        self.names = tuple(name for shadow in shadows for name in shadow.names)
+        self._events: list[Event] = []
 
-    def update(self, cycle: Cycle) -> tuple[float, ...]:
-        """Return the values of every shadow for a cycle whose command has left."""
+    def values(self, cycle: Cycle) -> tuple[float, ...]:
+        """Return the values of every shadow for a cycle."""
         sample, _, reference, _, voltage, _ = cycle
         found: list[float] = []
         for shadow, count in self._shadows:
             working = not shadow.failure
             found += shadow.update(sample, reference, voltage)[:count]
             if working and shadow.failure:
-                self.warnings.append(
-                    f"{shadow.name}, which only runs beside the loop, gave up: {shadow.failure.rstrip('.')}. "
-                    "The run goes on; its columns have no numbers from here on."
-                )
+                self._events.append(_gave_up(shadow, sample.t))
         return tuple(found)
+
+    def events(self) -> Sequence[Event]:
+        """Return what happened since the last call."""
+        told, self._events = self._events, []
+        return told
+
+
+def _gave_up(shadow: Shadow, t: float) -> Event:
+    return Event(
+        t,
+        "WARN",
+        EventKind.TELEMETRY,
+        f"{shadow.name}, which runs beside the loop only, gave up: {shadow.failure.rstrip('.')}. The run "
+        "goes on; its columns have no numbers from here on.",
+    )

@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.ipc.ring import Ring
+from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.dispatcher import DispatchThread, Sink, SinkDispatcher
 from dcmp_hil.telemetry.further_columns import NO_FURTHER_COLUMNS
 from dcmp_hil.telemetry.link_events import LinkWatch
+from dcmp_hil.telemetry.signals import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from dcmp_hil.control.model import Model
     from dcmp_hil.errors import TripError
@@ -80,7 +85,7 @@ class Recorder:
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self.recent_further: deque[tuple[float, ...]] = deque(maxlen=recent)
         self.further = further.names
-        self._apart = apart
+        self._apart, self._model = apart, model
         capacity = _SYNCHRONOUS_BLOCK_ROWS_MAX if in_line else _CAPACITY_ROWS
         self._ring = apart.ring if apart else Ring(capacity, further=further.names)
         self._source = further
@@ -137,6 +142,10 @@ class Recorder:
     def _tell_further(self) -> None:
         for event in self._source.events():
             self.event(event)
+
+    def last_columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return the columns of the last cycles, as many as the ring holds."""
+        return columns(Block(self._ring.reader().drain(), self._model, self.further))
 
     @property
     def t(self) -> float:

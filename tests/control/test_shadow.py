@@ -53,17 +53,17 @@ def test_a_shadow_has_the_bits_that_the_loop_has_of_the_same_kind(
     other = "kalman" if kind != "kalman" else "super_twisting"
     rig = change_rig(recorded.rig, [f"observer.kind={other}"])
     shadows = make_shadows(rig, [kind], make_controller(rig))
-    assert shadows.columns == (
+    assert shadows.names == (
         f"position_{kind}_rad",
         f"velocity_{kind}_rad_s",
         f"disturbance_{kind}_rad_s2",
-        f"voltage_demand_{kind}_v",
+        f"voltage_demand_{kind}_V",
     )
-    found = np.array([shadows.update(one) for one in cycles(recorded)])
+    found = np.array([shadows.values(one) for one in cycles(recorded)])
     assert len(found) == 400
     assert found[:, :3].tobytes() == again.estimate.tobytes()
     assert found[:, 3].tobytes() == again.demand.tobytes()
-    assert shadows.warnings == []
+    assert shadows.events() == []
 
 
 def test_the_present_gains_of_the_loop_are_those_of_its_shadows(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_the_present_gains_of_the_loop_are_those_of_its_shadows(tmp_path: Path) 
     controller = make_controller(recorded.rig)
     shadows = make_shadows(recorded.rig, ["kalman"], controller)
     controller.gains = controller.gains._replace(kp=0.0, kd=0.0, compensation=0.0)  # type: ignore[attr-defined]
-    last = [shadows.update(one) for one in cycles(recorded)][-1]
+    last = [shadows.values(one) for one in cycles(recorded)][-1]
     reference, f0, ku = cycles(recorded)[-1].reference, 0.1, 5.4
     assert last[3] == pytest.approx((reference.acceleration + f0 * last[1]) / ku, abs=2e-3)  # x2 is ahead
 
@@ -122,15 +122,18 @@ def test_a_shadow_that_fails_has_no_numbers_from_then_on_and_says_why_once(found
             Shadow("sound", _Broken(Estimate(1.0, 2.0, 3.0)), _Still()),
         ]
     )
-    assert len(shadows.columns) == 4 + 3  # without a controller there is no demand
-    rows = [shadows.update(cycle(k * T, position=0.5, sent=1.0)) for k in range(8)]
+    assert len(shadows.names) == 4 + 3  # without a controller there is no demand
+    rows = [shadows.values(cycle(k * T, position=0.5, sent=1.0)) for k in range(8)]
     assert rows[2] == (0.5, 0.0, 0.0, -0.5, 0.5, 0.0, 0.0)
     for row in rows[3:]:
         assert all(math.isnan(value) for value in row[:4])
         assert row[4:] == (1.0, 2.0, 3.0)
     assert broken.calls == 4
-    (warning,) = shadows.warnings
-    assert warning.startswith(f"broken, which only runs beside the loop, gave up: {why}")
+    (event,) = shadows.events()
+    assert event.t == pytest.approx(3 * T)
+    assert event.level == "WARN"
+    assert event.text.startswith(f"broken, which runs beside the loop only, gave up: {why}")
+    assert shadows.events() == []
 
 
 def test_a_class_of_ones_own_runs_beside_the_loop_and_is_checked(tmp_path: Path) -> None:
@@ -146,12 +149,12 @@ def test_a_class_of_ones_own_runs_beside_the_loop_and_is_checked(tmp_path: Path)
     kind = named(Mine)
     shadows = make_shadows(recorded.rig, [kind], make_controller(recorded.rig))
     name = "own_" + kind.replace(".", "_").replace(":", "_")
-    assert shadows.columns[1] == f"velocity_{name}_rad_s"
-    rows = [shadows.update(one) for one in cycles(recorded)]
+    assert shadows.names[1] == f"velocity_{name}_rad_s"
+    rows = [shadows.values(one) for one in cycles(recorded)]
     assert math.isfinite(rows[1][0])
     assert math.isnan(rows[2][0])
-    (warning,) = shadows.warnings
-    assert "expected Estimate(position, velocity, disturbance), three numbers" in warning
+    (event,) = shadows.events()
+    assert "expected Estimate(position, velocity, disturbance), three numbers" in event.text
 
 
 def test_a_controller_of_ones_own_is_asked_by_the_loop_alone() -> None:
@@ -164,8 +167,8 @@ def test_a_controller_of_ones_own_is_asked_by_the_loop_alone() -> None:
 
     rig = bench(f"controller.kind={named(Own)}")
     shadows = make_shadows(rig, ["kalman", "derivative"], make_controller(rig))
-    assert [name for name in shadows.columns if "voltage" in name] == []
-    assert len(shadows.columns) == 6
+    assert [name for name in shadows.names if "voltage" in name] == []
+    assert len(shadows.names) == 6
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS["controller"] if kind != "custom"])
@@ -181,7 +184,7 @@ def test_a_controller_of_the_package_keeps_no_state_so_that_shadows_may_share_it
 def test_the_observer_that_closes_the_loop_has_no_shadow() -> None:
     rig = bench("observer.kind=kalman")
     shadows = make_shadows(rig, ["kalman", "super_twisting"], make_controller(rig))
-    assert {name.split("_")[1] for name in shadows.columns} == {"super", "demand"}
+    assert {name.split("_")[1] for name in shadows.names} == {"super", "demand"}
 
 
 @pytest.mark.parametrize("kind", ["friction_kalman", "kalman"])

@@ -43,6 +43,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
         "--json": given("--json", "{folder}/figures.json", "-"),
         "--note": given("--note", "µ → ≤"),
         "--fault": given("--fault", "plant.shove:at=600ms,for=50ms", "wire.drop:p=0.01,at=600ms,for=100ms"),
+        "--compare": given("--compare", "friction_kalman,derivative"),
     },
     "check": {"RIG": (("bench-1khz",), ("{rig}",)), "--set": given("--set", "loop.rate_hz=500")},
     "paper": {
@@ -52,7 +53,7 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
     "replay": {
         "FILE": (("{csv}",), ("{recording}",)),
         "--set": given("--set", "observer.mu0_rad_s=150"),
-        "--compare": given("--compare", "observer=paper"),
+        "--compare": given("--compare", "observer=paper", "kalman,derivative"),
         **_columns(),
         "--inertia": given("--inertia", "0.16"),
         "--ku": given("--ku", "5.4"),
