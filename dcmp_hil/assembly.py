@@ -16,6 +16,7 @@ from dcmp_hil.control.predictor import LinearPredictor
 from dcmp_hil.control.shadow import Shadow, Shadows
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.device.factory import open_backend
+from dcmp_hil.errors import ConfigError
 from dcmp_hil.fault_hooks import NO_FAULTS
 from dcmp_hil.live.live_changes import LiveChanges, NoChanges
 from dcmp_hil.loop import LoopStages
@@ -29,7 +30,7 @@ from dcmp_hil.safety.speed_resolution import resolution
 from dcmp_hil.safety.supervisor import Supervisor
 from dcmp_hil.telemetry.block import ReferenceAligner
 from dcmp_hil.telemetry.diagnosis_columns import diagnosis_of
-from dcmp_hil.telemetry.further_columns import joined
+from dcmp_hil.telemetry.further_columns import fault_of, joined
 from dcmp_hil.telemetry.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -161,7 +162,10 @@ def make_laws(rig: Rig, compare: Iterable[str] = ()) -> Laws:
     """
     observer, controller = make_observer(rig), make_controller(rig)
     sources = diagnosis_of(observer, rig.observer.kind), make_shadows(rig, compare, controller)
-    return Laws(observer, controller, joined(sources))
+    further = joined(sources)
+    if fault := fault_of(further.names):
+        raise ConfigError(f"The columns of diagnosis and --compare: {fault}. Compare fewer observers.")
+    return Laws(observer, controller, further)
 
 
 def make_observer(rig: Rig) -> Observer:

@@ -53,6 +53,6 @@ def compare_in_file(replays: Mapping[str, tuple[ReplaySettings, ReplayResult]]) 
     )
     set_up = prepare(recording, settings)
     sections = {name: one.section for name, (one, _) in replays.items()}
-    samples = (rows.time, recording.position, set_up.voltage)
+    samples = tuple(column[rows.used] for column in (rows.time, recording.position, set_up.voltage))
     costs = observer_costs(sections, set_up.setting, settings.folders, samples)
     return compare_observers(rows, observers, reference, costs)

@@ -145,7 +145,8 @@ def compare_in_run(
     sections = {name: rig.observer, **{other: one.section for other, one in beside.items()}}
     if not trust:
         sections = {label: one for label, one in sections.items() if not isinstance(one, Custom)}
-    samples = (time, columns["position_rad"], columns["voltage_applied_V"])
+    names = ("time_s", "position_rad", "voltage_applied_V")
+    samples = tuple(columns[name][rows.used] for name in names)
     costs = observer_costs(sections, rig.observer_context, rig.plugin_folders, samples)
     return compare_observers(rows, [loop, *others], reference, costs).with_notes(note)
 
