@@ -12,7 +12,6 @@ import numpy as np
 
 from dcmp_hil.common.atomic_file import whole_file
 from dcmp_hil.errors import ConfigError
-from dcmp_hil.telemetry.further_columns import begin
 from dcmp_hil.telemetry.rerun.rig_view import view_of
 from dcmp_hil.telemetry.signals import columns, names
 from dcmp_hil.values import Event
@@ -65,8 +64,7 @@ def to_rrd(run: RecordedRun, path: Path) -> None:
     from dcmp_hil.telemetry.rerun.sink import RerunSink
 
     with _writing(path) as place:
-        sink = RerunSink(view_of(run.rig), place, "none")
-        begin(sink, run.further)
+        sink = RerunSink(view_of(run.rig, run.further), place, "none")
         for part in _in_order(run):
             if isinstance(part, Event):
                 sink.event(part)

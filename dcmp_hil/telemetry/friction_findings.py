@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.telemetry.block import Block
 
-_FOUND, _DISTRUST = "friction_found_rad_s2", "distrust"
+DISTRUST = "distrust"
+"""Column of how far an observer trusts its own model: 1 wholly, and more the less."""
+_FOUND = "friction_found_rad_s2"
 _LET_GO_ABOVE, _BACK_BELOW = 10.0, 2.0
 """Distrust above which an observer has let go of its model, and below which it is back."""
 _OFFER_DEVIATIONS, _OFFER_SHARE, _OFFER_DIGITS = 3.0, 0.05, 3
@@ -52,35 +55,57 @@ class FrictionFindings:
         return float(f"{found:.{_OFFER_DIGITS}g}") if far else None
 
 
+class ModelHold:
+    """Follows whether an observer holds to its model, cycle by cycle.
+
+    Attributes
+    ----------
+    away
+        Whether it has let go of it.
+    """
+
+    def __init__(self) -> None:
+        self.away = False
+
+    def of(self, distrust: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return where it has let go, shape (n,), for the distrust of the next cycles, shape (n,)."""
+        if not self.away and not (distrust > _LET_GO_ABOVE).any():
+            return np.zeros(len(distrust), dtype=bool)
+        away = np.empty(len(distrust), dtype=bool)
+        for k, m in enumerate(distrust.tolist()):
+            self.away = m >= _BACK_BELOW if self.away else m > _LET_GO_ABOVE
+            away[k] = self.away
+        return away
+
+
 class FrictionStatistics:
     """Makes the findings of a run, in bounded memory; they are None where no observer diagnoses friction."""
 
     def __init__(self) -> None:
         self._model = math.nan
-        self._known = self._away = False
+        self._known, self._hold = False, ModelHold()
         self._cycles = self._times = 0
         self._largest, self._largest_t = 0.0, math.nan
         self._restart()
 
     def add(self, block: Block, window: slice) -> None:
         """Add the cycles of a block that are in the window, at least one."""
-        if not {_FOUND, _DISTRUST} <= set(block.further):
+        if not {_FOUND, DISTRUST} <= set(block.further):
             return
         self._known, self._model = True, block.model.f1
-        t, distrust, found = (block[name][window] for name in ("t", _DISTRUST, _FOUND))
+        t, distrust, found = (block[name][window] for name in ("t", DISTRUST, _FOUND))
         self._cycles += len(t)
-        start = 0  # of the cycles in which it held
-        if self._away or (distrust > _LET_GO_ABOVE).any():
-            for k, (now, m) in enumerate(zip(t.tolist(), distrust.tolist(), strict=True)):
-                away = self._away
-                self._follow(now, m)
-                if self._away and not away:
-                    self._add(found[start:k], distrust[start:k])
-                elif away and not self._away:
-                    start = k
+        was = self._hold.away
+        away = self._hold.of(distrust)
+        turns = np.flatnonzero(np.diff(away, prepend=was)).tolist()
+        for first, end in pairwise((0, *turns, len(t))):
+            if first < end and away[first]:
+                self._times += first in turns
+                self._take_largest(t[first:end], distrust[first:end])
+            elif first < end:
+                if first in turns:
                     self._restart()
-        if not self._away:
-            self._add(found[start:], distrust[start:])
+                self._add(found[first:end], distrust[first:end])
 
     def findings(self) -> FrictionFindings | None:
         """Return the findings of the blocks so far."""
@@ -119,12 +144,8 @@ class FrictionStatistics:
         self._sum += float(off.sum())
         self._squares += float(off @ off)
 
-    def _follow(self, t: float, distrust: float) -> None:
-        """Take the distrust of one cycle."""
-        if not self._away and distrust > _LET_GO_ABOVE:
-            self._away = True
-            self._times += 1
-        elif self._away and distrust < _BACK_BELOW:
-            self._away = False
-        if self._away and distrust > self._largest:
-            self._largest, self._largest_t = distrust, t
+    def _take_largest(self, t: NDArray[np.float64], distrust: NDArray[np.float64]) -> None:
+        """Take cycles in which the observer had let go."""
+        k = int(np.argmax(distrust))
+        if distrust[k] > self._largest:
+            self._largest, self._largest_t = float(distrust[k]), float(t[k])

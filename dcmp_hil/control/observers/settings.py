@@ -64,6 +64,11 @@ class ObserverSettings(Section, ABC):
         """Return the keys that act at the start of a run only: a change of one waits for the next start."""
         return ()
 
+    @classmethod
+    def diagnosis(cls) -> tuple[str, ...]:
+        """Return the names of what the observer diagnoses of itself; see `DiagnosedObserver`."""
+        return ()
+
     def tuning(self, context: ObserverContext) -> object:  # noqa: ARG002
         """Return what the observer's `retune` takes: small, and without pydantic."""
         return None

@@ -15,9 +15,11 @@ from dcmp_hil.telemetry.rerun.link_columns import LINK
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE
 from dcmp_hil.telemetry.rerun.plots import DISTURBANCE_ERRORS, TIMING, plots
 from dcmp_hil.telemetry.rerun.rails import WINDOW_S
-from dcmp_hil.telemetry.rerun.scene import LANES, LOG
+from dcmp_hil.telemetry.rerun.scene import LOG, lanes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from dcmp_hil.telemetry.rerun.rig_view import RigView
 
 TIMELINE = "loop_time"
@@ -40,14 +42,20 @@ def dashboard(rig: RigView, *, tripped: bool = False) -> rrb.Blueprint:
         Whether the run ended by a trip: plots are red, and the banner has room for cause and cure.
     """
     left = rrb.Vertical(_pendulum(rig), _portrait(), _parameters(), row_shares=[36, 32, 32])
-    shown = [plot for plot in plots() if plot.path != DISTURBANCE_ERRORS or _knows_disturbance(rig)]
+    all_of_them = plots(rig.further)
+    shown = [plot for plot in all_of_them if plot.path != DISTURBANCE_ERRORS or _knows_disturbance(rig)]
     views = {plot.path: _scrolling(plot.path, plot.titled, tripped=tripped) for plot in shown}
-    happens = rrb.Vertical(*(views[plot.path] for plot in shown if not plot.wrong))
-    wrong = [views[plot.path] for plot in shown if plot.wrong and plot.path != TIMING]
-    timing = rrb.Tabs(views[TIMING], *_histograms(), active_tab=0)
-    states = rrb.Horizontal(_states(), _events(), column_shares=[50, 50])
+    beside: dict[str, list[rrb.View]] = {}
+    for plot in shown:
+        if plot.beside:
+            beside.setdefault(plot.beside, []).append(views[plot.path])
+    own = [plot for plot in shown if not plot.beside]
+    happens = rrb.Vertical(*(_tabbed(views[one.path], beside, one.path) for one in own if not one.wrong))
+    wrong = [_tabbed(views[one.path], beside, one.path) for one in own if one.wrong and one.path != TIMING]
+    timing = rrb.Tabs(*beside.get(TIMING, ()), views[TIMING], *_histograms(), active_tab=0)
+    states = rrb.Horizontal(_states(rig), _events(), column_shares=[50, 50])
     if rig.wired:
-        states = rrb.Horizontal(_states(), _link(), _events(), column_shares=[36, 24, 40])
+        states = rrb.Horizontal(_states(rig), _link(), _events(), column_shares=[36, 24, 40])
     right = rrb.Vertical(
         _banner(),
         rrb.Horizontal(happens, rrb.Vertical(*wrong, timing)),
@@ -55,6 +63,13 @@ def dashboard(rig: RigView, *, tripped: bool = False) -> rrb.Blueprint:
         row_shares=[16, 69, 15] if tripped else [8, 77, 15],
     )
     return opened(rrb.Horizontal(left, right, column_shares=[_LEFT_SHARE, 100 - _LEFT_SHARE]))
+
+
+def _tabbed(
+    view: rrb.TimeSeriesView, beside: Mapping[str, Sequence[rrb.View]], path: str
+) -> rrb.View | rrb.Tabs:
+    """Return the view of a plot, with tabs where others stand beside it: a fifth row would be too low."""
+    return rrb.Tabs(view, *beside[path], active_tab=0) if path in beside else view
 
 
 def opened(content: rrb.Container | rrb.View, *, follow: bool = True) -> rrb.Blueprint:
@@ -177,10 +192,10 @@ def _histograms() -> list[rrb.BarChartView]:
     return [rrb.BarChartView(origin=one.entity, name=one.name, plot_legend=legend) for one in HISTOGRAMS]
 
 
-def _states() -> rrb.StateTimelineView:
+def _states(rig: RigView) -> rrb.StateTimelineView:
     return rrb.StateTimelineView(
         origin="/",
-        contents=[f"+ /{lane}" for lane in LANES],
+        contents=[f"+ /{lane}" for lane in lanes_of(rig)],
         name="Phase and states",
         titlebar=False,
         time_view=_axis(),

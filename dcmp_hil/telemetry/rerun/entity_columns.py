@@ -7,13 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
+from dcmp_hil.telemetry.friction_findings import DISTRUST, ModelHold
 from dcmp_hil.telemetry.rerun import banner
 from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS, FixedRangeHistogram, Histogram
 from dcmp_hil.telemetry.rerun.link_columns import LinkColumns
 from dcmp_hil.telemetry.rerun.parameter_table import PATH, RELATIVE, Parameters, line_of, page_of
 from dcmp_hil.telemetry.rerun.phase_portrait import Portrait
 from dcmp_hil.telemetry.rerun.plot_columns import PlotColumns
-from dcmp_hil.telemetry.rerun.scene import ARM, GHOST, LIMITS, LOG, lane_path, turned
+from dcmp_hil.telemetry.rerun.scene import (
+    ARM,
+    GHOST,
+    LIMITS,
+    LOG,
+    MODEL_LANE,
+    MODEL_STATES,
+    lane_path,
+    turned,
+)
 from dcmp_hil.telemetry.rerun.transitions import TransitionDetector
 from dcmp_hil.values import LinkData, PhaseData
 
@@ -54,7 +64,8 @@ class Frames:
         self._histograms = [
             (one, FixedRangeHistogram(one.low * rig.period, one.high * rig.period)) for one in HISTOGRAMS
         ]
-        self._lanes = {name: TransitionDetector() for name in ("voltage", "samples")}
+        self._lanes = {name: TransitionDetector() for name in ("voltage", "samples", MODEL_LANE)}
+        self._hold = ModelHold()
         self._shown: dict[str, str] = {}  # lane to the newest state
         self._punctual = np.empty(0)  # s, the first sample, unless it was late
         self._last_pose = self._last_second = -1  # slots of their rates
@@ -210,6 +221,9 @@ class Frames:
         if limit is not None:
             at_limit = np.abs(block["voltage_sent"]) >= limit * (1.0 - 1e-9)
             questions["voltage"] = (at_limit, ("within limits", "at the limit"))
+        if DISTRUST in block.further:
+            holds, let_go = MODEL_STATES
+            questions[MODEL_LANE] = (self._hold.of(block[DISTRUST]), (holds, let_go))
         for lane, (truth, names) in questions.items():
             rows = self._lanes[lane].changes(truth)
             if len(rows):

@@ -62,7 +62,7 @@ class PlotColumns:
     def of_block(self, block: Block) -> Iterator[Rows]:
         """Yield the rows for consecutive cycles, at least one and not more than about a second."""
         if not self._drawn:
-            self._drawn = self._choose(known_of(block))
+            self._drawn = self._choose(known_of(block), block.further)
             for drawn in self._drawn:
                 yield from _styles(drawn)
         every = block["t"]
@@ -90,10 +90,10 @@ class PlotColumns:
                 yield from _rails(drawn, np.array([event.t]), np.array([drawn.rails.reach(event.t)]))
             yield from self._due_marks(drawn)
 
-    def _choose(self, known: Known) -> list[DrawnPlot]:
+    def _choose(self, known: Known, further: tuple[str, ...]) -> list[DrawnPlot]:
         """Leave out what is unknown of the plant, before the first line is drawn."""
         found = []
-        for plot in plots():
+        for plot in plots(further):
             lines = tuple(line for line in plot.lines if line.drawn(known))
             if lines:
                 least = self._limit if plot.path == VOLTAGE and self._limit is not None else 0.0

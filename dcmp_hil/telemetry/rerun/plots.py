@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 
     Column = NDArray[np.float64]
 
-VOLTAGE, TIMING, DISTURBANCE_ERRORS = "control/voltage_V", "loop/timing_us", "errors/disturbance_rad_s2"
+VOLTAGE, TIMING = "control/voltage_V", "loop/timing_us"
+DISTURBANCE, DISTURBANCE_ERRORS = "joint/disturbance_rad_s2", "errors/disturbance_rad_s2"
 
 
 class Known(NamedTuple):
@@ -80,6 +81,10 @@ class Plot:
     """Whether it is of the column "how wrong", and not of "what happens"."""
     frozen: bool = False
     """Whether it ends with a trip: later references and estimates mean nothing, and would flatten it."""
+    needs: tuple[str, ...] = ()
+    """Further columns without which it is not there."""
+    beside: str = ""
+    """Path of the plot whose place it shares, as a tab; empty for a place of its own."""
 
     @property
     def titled(self) -> str:
@@ -120,7 +125,7 @@ _PLOTS = (
         ),
     ),
     Plot(
-        "joint/disturbance_rad_s2",
+        DISTURBANCE,
         frozen=True,
         lines=(
             Line("true", TRUE_RGB, lambda b: b["disturbance_true"], ("disturbance_true_rad_s2",), truth=True),
@@ -219,19 +224,44 @@ _PLOTS = (
         name="Timing, worst [µs]",
         wrong=True,
     ),
+    Plot(
+        "observer/disturbance_rad_s2",
+        (Line("found", ESTIMATE_RGB, lambda b: b["disturbance_found_rad_s2"]),),
+        name="Disturbance beyond gravity and friction [rad/s²]",
+        frozen=True,
+        needs=("disturbance_found_rad_s2",),
+        beside=DISTURBANCE,
+    ),
+    Plot(
+        "observer/friction_rad_s2",
+        (
+            Line("difference", ESTIMATE_RGB, lambda b: b["friction_found_rad_s2"] - b.model.f1),
+            Line("deviation", FAINT_RGB, lambda b: b["friction_deviation_rad_s2"]),
+            Line("deviation", FAINT_RGB, lambda b: -b["friction_deviation_rad_s2"]),
+        ),
+        name="Friction: found minus model [rad/s²]",
+        wrong=True,
+        frozen=True,
+        needs=("friction_found_rad_s2", "friction_deviation_rad_s2"),
+        beside=TIMING,
+    ),
 )
 
 
-def plots() -> tuple[Plot, ...]:
-    """Return every plot: the table's own, and those of the signals that no line of it stands for."""
+def plots(further: tuple[str, ...] = ()) -> tuple[Plot, ...]:
+    """Return every plot of a run with these further columns.
+
+    They are the table's own, and those of the signals that no line of it stands for.
+    """
+    own = [plot for plot in _PLOTS if set(plot.needs) <= set(further)]
     told = {histogram.column for histogram in HISTOGRAMS}
-    told |= {column for plot in _PLOTS for line in plot.lines for column in line.columns}
+    told |= {column for plot in own for line in plot.lines for column in line.columns}
     more: dict[str, list[Line]] = {}
     for signal in signals.SIGNALS:
         if signal.column not in told:
             line = Line(signal.label, signal.colour, signal.read, (signal.column,))
             more.setdefault(signal.plot, []).append(line)
-    grown = [replace(plot, lines=(*plot.lines, *more.pop(plot.path, ()))) for plot in _PLOTS]
+    grown = [replace(plot, lines=(*plot.lines, *more.pop(plot.path, ()))) for plot in own]
     return (*grown, *(Plot(path, tuple(lines)) for path, lines in more.items()))
 
 

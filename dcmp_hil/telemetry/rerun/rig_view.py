@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dcmp_hil.config.explain import explain, numbers
 from dcmp_hil.config.rig import KINDS
+from dcmp_hil.config.sections import Custom
 from dcmp_hil.control.model import UNKNOWN_MODEL
 from dcmp_hil.platform.host_info import host_facts
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
@@ -46,6 +47,8 @@ class RigView:
         "reference.kind=sine" to the keys of that kind, for what may change in a run.
     numbers
         Of the parameters, those that are numbers.
+    further
+        Names of the further columns of its cycles, as far as they are known before the run.
     """
 
     name: str
@@ -58,13 +61,24 @@ class RigView:
     about: tuple[tuple[str, str], ...] = ()
     kinds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
+    further: tuple[str, ...] = ()
 
 
 _FIRST_KEYS = ("controller", "observer", "reference", "loop")  # what is tuned is visible without scrolling
 
 
-def view_of(rig: Rig) -> RigView:
-    """Return the parts of a rig that a viewer shows."""
+def view_of(rig: Rig, further: tuple[str, ...] | None = None) -> RigView:
+    """Return the parts of a rig that a viewer shows.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    further
+        Names of the further columns of its cycles; None takes those that its built-in observer has.
+    """
+    if further is None:
+        further = () if isinstance(rig.observer, Custom) else rig.observer.diagnosis()
     limit = rig.amplifier.limit
     rows = [(key, value.strip('"')) for key, value, _ in explain(rig) if key != "name"]
     return RigView(
@@ -78,6 +92,7 @@ def view_of(rig: Rig) -> RigView:
         about=_about(),
         kinds=_kinds(),
         numbers=numbers(rig),
+        further=further,
     )
 
 

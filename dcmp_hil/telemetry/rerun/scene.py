@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
+from dcmp_hil.telemetry.friction_findings import DISTRUST
 from dcmp_hil.telemetry.rerun.parameter_table import RELATIVE, Parameters, table_of
 from dcmp_hil.telemetry.rerun.plots import VOLTAGE
 from dcmp_hil.telemetry.signals import (
@@ -37,6 +38,8 @@ LANES = {
     "samples": {"on time": (74, 78, 84), "late": ERROR_RGB},
 }
 """Lanes of the timeline of states, with the colour of each state: what is as it should be is quiet."""
+MODEL_LANE, MODEL_STATES = "model", {"holds": (74, 78, 84), "let go": ESTIMATE_RGB}
+"""Lane of an observer that lets go of its model where this does not hold."""
 
 _SERIES_COLOURS = (
     *((78, 121, 167), (242, 142, 43), (225, 87, 89), (118, 183, 178), (89, 161, 79)),
@@ -45,6 +48,11 @@ _SERIES_COLOURS = (
 """Colours of lines that only have to differ."""
 _ARM_LENGTH = 1.0
 _ARM_DEPTH = 0.12  # the arm moves before the dial
+
+
+def lanes_of(rig: RigView) -> dict[str, dict[str, tuple[int, int, int]]]:
+    """Return the lanes of a rig, and the states of each."""
+    return {**LANES, MODEL_LANE: MODEL_STATES} if DISTRUST in rig.further else LANES
 
 
 def lane_path(lane: str) -> str:
@@ -61,7 +69,7 @@ def log_scenery(stream: rr.RecordingStream, rig: RigView) -> None:
     if rig.voltage_limit is not None:
         style = rr.SeriesLines(names=["limit", "limit"], colors=[(130, 60, 60)] * 2, widths=[1.0] * 2)
         stream.log(LIMITS, style, static=True)
-    for lane, states in LANES.items():
+    for lane, states in lanes_of(rig).items():
         look = rr.StateConfiguration(values=list(states), colors=list(states.values()))
         stream.log(lane_path(lane), look, static=True)
 

@@ -56,6 +56,11 @@ class FrictionKalmanSettings(ObserverSettings):
         """Return the key of the variance that the friction level starts with."""
         return ("f1_uncertainty",)
 
+    @classmethod
+    def diagnosis(cls) -> tuple[str, ...]:
+        """Return the names of the filter's own state, and of how far it is to be trusted."""
+        return FrictionKalman.DIAGNOSIS
+
     def tuning(self, context: ObserverContext) -> FrictionKalmanTuning:  # noqa: ARG002
         """Return what the observer is retuned with."""
         return FrictionKalmanTuning(self.d_noise, self.edge_counts)
