@@ -8,7 +8,7 @@ from subprocess import run
 import pytest
 
 from tests.installed import environment
-from tests.sampling import chosen, file_is_drawn
+from tests.sampling import WHOLE, chosen, file_is_drawn
 
 HERE = Path(__file__).parent
 NAMES = [f"test[{case}]" for case in range(21)]
@@ -37,6 +37,9 @@ def test_files_are_drawn_of_every_folder_and_all_texts_draw_every_file() -> None
     assert all({file.parent for file in each} == {file.parent for file in files} for each in drawn)
     assert max(map(len, drawn)) < 0.35 * len(files)
     assert set().union(*drawn) == set(files)
+    whole = {file for file in files if file.parent.name in WHOLE}
+    assert {file.parent.name for file in whole} == set(WHOLE)
+    assert all(whole <= each for each in drawn)
 
 
 def test_files_that_are_not_drawn_are_not_collected() -> None:
