@@ -15,6 +15,7 @@ import numpy as np
 from dcmp_hil.telemetry import signals
 from dcmp_hil.telemetry.plot_labels import title
 from dcmp_hil.telemetry.rerun.histogram import HISTOGRAMS
+from dcmp_hil.telemetry.rerun.shadow_lines import shadow_lines
 from dcmp_hil.telemetry.signals import (
     DEMAND_RGB,
     ERROR_RGB,
@@ -251,7 +252,8 @@ _PLOTS = (
 def plots(further: tuple[str, ...] = ()) -> tuple[Plot, ...]:
     """Return every plot of a run with these further columns.
 
-    They are the table's own, and those of the signals that no line of it stands for.
+    They are the table's own, with the lines of observers that ran beside the loop, and those of the signals
+    that no line of it stands for.
     """
     own = [plot for plot in _PLOTS if set(plot.needs) <= set(further)]
     told = {histogram.column for histogram in HISTOGRAMS}
@@ -261,6 +263,8 @@ def plots(further: tuple[str, ...] = ()) -> tuple[Plot, ...]:
         if signal.column not in told:
             line = Line(signal.label, signal.colour, signal.read, (signal.column,))
             more.setdefault(signal.plot, []).append(line)
+    for path, label, colour, read, truth in shadow_lines(further):
+        more.setdefault(path, []).append(Line(label, colour, read, truth=truth))
     grown = [replace(plot, lines=(*plot.lines, *more.pop(plot.path, ()))) for plot in own]
     return (*grown, *(Plot(path, tuple(lines)) for path, lines in more.items()))
 
