@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 MESSAGE_BYTES_MAX = 1 << 16
 """Bytes of the longest message."""
 _WORK_TIMEOUT_S = 60.0  # s that a process has which works at its answer
+_UNDO_TRIALS_MAX = 10  # of which each but the last was interrupted; a child without an owner is ended, too
 _CODE = """
 import sys
 sys.path[:] = {path!r}
@@ -42,8 +43,8 @@ main(ParentProcess({parent}, {channel}, {setup}), *{arguments})
 class ChildProcess:
     """A child as its parent sees it.
 
-    The constructor returns the owner of a child, or raises and leaves no child: also where the handler of a
-    signal raises in it. A child whose owner is forgotten before `hang_up` is ended.
+    The constructor returns the owner of a child, or raises and leaves no child: also where the handlers of
+    signals raise in it. A child whose owner is forgotten before `hang_up` is ended.
 
     Parameters
     ----------
@@ -94,10 +95,18 @@ class ChildProcess:
         try:
             start.do()
         except BaseException:  # `_start` failed and left nothing behind, or a signal came at any instant
-            start.settle()
-            if self._ending:
-                self._ending()
+            self._undo(start)
             raise
+
+    def _undo(self, start: UninterruptedWork) -> None:
+        """End what was started, and again where a further signal interrupts that."""
+        for _ in range(_UNDO_TRIALS_MAX):
+            with suppress(KeyboardInterrupt):
+                start.settle()
+                if self._ending:
+                    _end_unowned(self.channel, self.process)
+                    self._ending.detach()
+                return
 
     def _start(
         self,

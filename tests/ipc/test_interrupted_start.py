@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -61,6 +61,38 @@ def test_constructor_returns_an_owner_or_leaves_nothing_at_every_instruction(
     assert len(made.processes) > 1  # some of the steps come after the start of the process
     child.hang_up()
     child.end(0.0)
+
+
+@pytest.mark.parametrize("when", ["before", "behind"])
+@pytest.mark.parametrize("step", ["settle", "_hang_up", "end_process"])
+def test_a_second_signal_leaves_no_child_either(
+    made: Made, monkeypatch: pytest.MonkeyPatch, step: str, when: str
+) -> None:
+    """The first one comes when the child is there, the second one and a third while it is ended."""
+    do = UninterruptedWork.do
+
+    def interrupted(work: UninterruptedWork) -> None:
+        do(work)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(UninterruptedWork, "do", interrupted)
+    place = UninterruptedWork if step == "settle" else child_process
+    whole, left = getattr(place, step), [1, 2]
+
+    def cut_off(*arguments: Any) -> Any:
+        if when == "behind" or not left:
+            whole(*arguments)
+        if left:
+            left.pop()
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(place, step, cut_off)
+    with pytest.raises(KeyboardInterrupt):
+        ChildProcess(MODULE, None)
+    assert left == []
+    (process,) = made.processes
+    assert process.returncode == -signal.SIGKILL
+    assert made.open_files == set()
 
 
 def test_nothing_is_left_of_a_child_that_cannot_be_started(
