@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from dcmp_hil import loop
 from dcmp_hil.assembly import assemble, make_laws
 from dcmp_hil.config.compared_observers import observer_kinds
+from dcmp_hil.config.run_times import check_times
 from dcmp_hil.control.trajectory import LOWERING_TIME_S
-from dcmp_hil.errors import ConfigError, DeadlineError, TripError
+from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
 from dcmp_hil.ipc.run_end import ZERO, end_after
 from dcmp_hil.live.live_changes import LiveChanges
@@ -33,11 +34,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.device.disarm import DeviceEnd
     from dcmp_hil.fault_hooks import Faults
+    from dcmp_hil.ipc.run_end import RunEnd
     from dcmp_hil.live import CommandInterface
     from dcmp_hil.telemetry.dispatcher import Sink
     from dcmp_hil.telemetry.sink_factories import SinkMaker
     from dcmp_hil.values import EventData, Level
+
+_END_TIME_S = 10.0
+"""s in which a second Ctrl-C interrupts nothing of the end: what it takes when nothing hangs is below 3 s."""
 
 
 class Session:
@@ -96,7 +102,7 @@ class Session:
         compare: Sequence[str] = (),
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
-        _check_times(length, window_from, fast=fast)
+        check_times(length, window_from, fast=fast)
         if not fast:
             require_linux("a run in real time")
         self.rig = rig
@@ -155,15 +161,19 @@ class Session:
         BackendError
             If the device or the way to it fails.
         """
+        with self.stop:
+            self._run()
+
+    def _run(self) -> None:
         stages, recorder = self._stages, self._recorder
         began_ns = self._wall.now_ns()
         end, why, reached, armed = ZERO, "", False, False
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
-            with self.stop, self._open_telemetry(), self._realtime or nullcontext():
+            with self._open_telemetry(), self._realtime or nullcontext():
                 self._say_where()
                 began_ns, reached = self._wall.now_ns(), True
-                with stages.backend:
+                with self.stop.held_behind(_END_TIME_S), stages.backend:
                     armed = True
                     self._run_loop()
         except TripError as seen:
@@ -181,18 +191,31 @@ class Session:
             end, why = end_after(error, reached=reached, armed=armed), f"{error} "
             raise
         finally:
+            try:
+                self.stop.hold(_END_TIME_S)
+            finally:  # also where a second Ctrl-C comes just before
+                self._finish(end, why, began_ns)
+
+    def _finish(self, end: RunEnd, why: str, began_ns: int) -> None:
+        """Report the end, and close what the run was kept in, also where something else fails."""
+        self.stop.hold(_END_TIME_S)
+        recorder = self._recorder
+        try:
             if self._control:
                 self.stop.wake_no_more()
                 self._control.close(f"{why}{end.sentence}", end.code)
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
-            recorder.tell_rest()
-            if not why:
-                self._tell_how_device_ended()
+            recorder.link.finish(recorder.t)
+            ended: DeviceEnd | None = getattr(self._stages.backend, "device_end", None)
+            if not why and ended and ended.fault:
+                self._tell("WARN", EventKind.DEVICE_END, ended.warning)
             self._tell(end.level, EventKind.END, end.words, end.forced)
+        finally:
             recorder.close()
             if self._apart:
                 self._figures = self._apart.figures
+            self.stop.hold(_END_TIME_S)  # what is kept becomes files, or is thrown away, by the caller
 
     def _open_telemetry(self) -> AbstractContextManager[None]:
         """Make the sinks, here and in a process of their own, before anything is armed or real-time."""
@@ -234,16 +257,6 @@ class Session:
         """Report an event at the device time of the last cycle."""
         self._recorder.event(Event(self._recorder.t, level, kind, text, data))
 
-    def _tell_how_device_ended(self) -> None:
-        """Warn where the device stopped by a fault of its own at the end, and not because it was told to."""
-        ended = getattr(self._stages.backend, "device_end", None)
-        if ended and ended.fault:
-            sentence = (
-                f"the device ended the run by itself, in fault {ended.fault}: the last commands, 0 V and "
-                "disarm, did not reach it. Check the way from host to device."
-            )
-            self._tell("WARN", EventKind.DEVICE_END, sentence)
-
     def _say_where(self) -> None:
         """Report the computer, and the requests that it did not grant."""
         self._recorder.event(Event(0.0, "INFO", EventKind.HOST, in_words(self._host)))
@@ -284,15 +297,3 @@ class Session:
             compared=self._compared,
             last_columns=self._recorder.last_columns() if self._compared and not columns else {},
         )
-
-
-def _check_times(length: float, window_from: float, *, fast: bool) -> None:
-    if not 0.0 <= length < math.inf:
-        raise ConfigError(f"duration: got {length}; expected seconds, 0 (until Ctrl-C) or more.")
-    if not 0.0 <= window_from < (length or math.inf):
-        raise ConfigError(
-            f"from: got {window_from} s, outside the run of {length:g} s. "
-            "Choose an earlier start of the window, or a longer duration."
-        )
-    if fast and length == 0.0:
-        raise ConfigError("duration: 0 (until Ctrl-C) and virtual time would never end. Give a duration.")

@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 import os
 import signal
+import sys
 import threading
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from dcmp_hil import run
+from dcmp_hil import run, session
 from dcmp_hil.errors import TripError
 from tests.helpers import STEADY, HeldRun, T, bench
 from tests.stages import texts_of
 
 if TYPE_CHECKING:
-    from dcmp_hil.values import Sample
+    from types import FrameType
+
+    from dcmp_hil.telemetry.block import Block
+    from dcmp_hil.values import Event, Sample
+
+_LINES_BEHIND_ZERO_MIN = 10
 
 
 def test_run_lowers_the_arm_after_its_duration() -> None:
@@ -98,6 +105,64 @@ def test_run_ends_in_the_same_period_when_a_signal_comes(number: signal.Signals)
     assert held.session.stop.signal is number
     assert not held.backend.live
     assert signal.getsignal(number) is before
+
+
+class _Kept:
+    """A sink that says whether it was closed."""
+
+    def __init__(self) -> None:
+        self.closed = False
+
+    def block(self, block: Block) -> None:
+        """Take nothing."""
+
+    def event(self, event: Event) -> None:
+        """Take nothing."""
+
+    def close(self) -> None:
+        """Say so."""
+        self.closed = True
+
+
+def _interrupted_at_zero(step: int) -> bool:
+    """End a run by Ctrl-C, and press it again at a line behind 0 V; return whether there is such a line."""
+
+    def first(n: int, sample: Sample) -> Sample:
+        if n == 20:
+            os.kill(os.getpid(), signal.SIGINT)
+        return sample
+
+    kept, left = _Kept(), step
+    held = HeldRun(*STEADY, duration=30.0, on_read=first, sinks=[kept])
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal left
+        if frame.f_code.co_filename != session.__file__:
+            return None
+        if event == "line" and held.reads > 20 and not held.backend.live:
+            left -= 1
+            if not left:
+                os.kill(os.getpid(), signal.SIGINT)
+        return trace
+
+    handler, before = signal.getsignal(signal.SIGINT), sys.gettrace()
+    sys.settrace(trace)
+    try:
+        with suppress(KeyboardInterrupt):
+            held.run()
+    finally:
+        sys.settrace(before)
+    assert signal.getsignal(signal.SIGINT) is handler
+    assert kept.closed, step
+    assert held.session.result().summary.periods == 21
+    return left <= 0
+
+
+def test_a_second_ctrl_c_behind_0_V_keeps_no_recording_open() -> None:
+    step = 1
+    while _interrupted_at_zero(step):
+        step += 1
+    assert step > _LINES_BEHIND_ZERO_MIN
 
 
 def test_run_raises_at_once_when_ctrl_c_comes_twice() -> None:

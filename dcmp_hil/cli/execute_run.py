@@ -99,16 +99,15 @@ def _is_file(rig_name: str) -> bool:
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
     """Run, and keep files before anything is printed; the run's own end decides the exit code."""
     folder = RunFolder(rig.name) if options.keep else None
-    began, incomplete = False, ""
+    session, incomplete = None, ""
     try:
         with split_stderr(folder.path / process_log.LOG_FILE_NAME if folder else None):
             session = _session(rig, faults, options, folder, stop)
             end = _to_its_end(session)
-            began = session.began
-            if began:
+            if session.began:
                 incomplete = _conclude(session, options, folder, end)
     finally:
-        if folder is not None and not began:  # its error says why
+        if folder is not None and not (session is not None and session.began):  # its error says why
             folder.discard()
     if end.error is not None:
         raise end.error

@@ -26,6 +26,14 @@ class DeviceEnd(NamedTuple):
     state: str  # IDLE, FAULT ...
     fault: str  # its name; empty without one
 
+    @property
+    def warning(self) -> str:
+        """Return what a fault means for a run that ended as it was asked to."""
+        return (
+            f"the device ended the run by itself, in fault {self.fault}: the last commands, 0 V and disarm, "
+            "did not reach it. Check the way from host to device."
+        )
+
 
 class DisarmSequence:
     """The end of a session.

@@ -14,6 +14,8 @@ import weakref
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Self
 
+from dcmp_hil.platform.clock import MonotonicClock
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType, TracebackType
@@ -23,6 +25,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 TAKEN_FLAG = 0x80
 """Added to the number of a signal where Python has handled it, and not only the kernel delivered it."""
 _STOP = "STOP"
+_FOR_EVER_NS = 1 << 63
 
 
 class Interrupted(KeyboardInterrupt):
@@ -55,7 +58,8 @@ class StopRequest:
         self._woken = -1  # descriptor
         self._woken_before = -1
         self._entered = 0
-        self._held = False
+        self._clock = MonotonicClock()
+        self._held_until_ns = 0
 
     @property
     def exit_code(self) -> int:
@@ -123,19 +127,31 @@ class StopRequest:
         if self._woken != -1:
             signal.set_wakeup_fd(self._woken, warn_on_full_buffer=False)
 
+    def hold(self, within: float) -> None:
+        """Let a second SIGINT interrupt nothing for so many seconds, which an end takes."""
+        self._held_until_ns = self._clock.now_ns() + int(within * 1e9)
+
     @contextmanager
-    def held(self) -> Iterator[None]:
-        """Let a second SIGINT interrupt nothing, so that files that are being written become complete."""
-        before, self._held = self._held, True
+    def held_behind(self, within: float) -> Iterator[None]:
+        """Hold a second SIGINT for so many seconds after what is done here, which it does interrupt."""
         try:
             yield
         finally:
-            self._held = before
+            self.hold(within)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let a second SIGINT interrupt nothing, so that files that are being written become complete."""
+        self._held_until_ns = _FOR_EVER_NS
+        try:
+            yield
+        finally:
+            self._held_until_ns = 0
 
     def _ask(self, number: int, _: FrameType | None = None) -> None:
         again = number == signal.SIGINT and self.signal is not None
         forced = number == signal.SIGTERM and self.signal is signal.SIGINT
-        if (again or forced) and not self._held:
+        if (again or forced) and self._clock.now_ns() >= self._held_until_ns:
             raise Interrupted
         if self._woken != -1:
             with suppress(OSError):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from dcmp_hil.cli.run_sinks import dashboard, status_line
+from dcmp_hil.recording.reader import read_run
 from tests.telemetry.runs import entities
 
 _TIMEOUT_S = 60.0  # s: generous, these machines are shared
@@ -54,6 +55,20 @@ def test_run_keeps_what_was_recorded_when_signalled(
     assert figures["periods"] > 100
     assert "voltage, peak" in out  # tracking has not begun yet
     assert (tmp_path / "figures.json").exists()
+
+
+@pytest.mark.parametrize("delay", [0.002, 0.02, 0.1, 0.3])  # s: before 0 V, in the end of the run, after it
+def test_a_second_ctrl_c_loses_no_recording(tmp_path: Path, delay: float) -> None:
+    process = _start(tmp_path, "--duration", "0")
+    folder = _wait_until_it_records(tmp_path)
+    process.send_signal(signal.SIGINT)
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=_TIMEOUT_S)
+    assert process.returncode in {0, 130, -signal.SIGINT}, err  # the last is of Python on its way out
+    assert "Traceback" not in err
+    assert read_run(folder).complete
+    assert json.loads((folder / "summary.json").read_text())["ended_by"] in {"SIGINT", "KeyboardInterrupt"}
 
 
 def test_recording_is_whole_when_killed(tmp_path: Path) -> None:
