@@ -40,6 +40,45 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def unnamed_file(path: Path) -> Iterator[Path]:
+    """Do as `whole_file` with a file that has no name before it is whole, if the file system has such files.
+
+    A process that is killed meanwhile leaves nothing behind. What is yielded leads to the file in this
+    process and in others; it is opened and written there, and not replaced.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be named, or what was written cannot be kept.
+    """
+    place, beside = real(path), place_beside(path)
+    file = None if beside is None else _unnamed(place.parent)
+    if beside is None or file is None:
+        with whole_file(path) as named:
+            yield named
+        return
+    try:
+        yield Path(f"/proc/{os.getpid()}/fd/{file}")
+        if place.exists():
+            os.fchmod(file, stat.S_IMODE(place.stat().st_mode))
+        beside.unlink(missing_ok=True)
+        os.link(
+            f"/proc/self/fd/{file}", beside, src_dir_fd=0
+        )  # without a descriptor, the entry is linked itself
+        beside.replace(place)
+    finally:
+        os.close(file)
+
+
+def _unnamed(folder: Path) -> int | None:
+    """Return the descriptor of a new file without a name; None where there are none, as on NFS."""
+    try:
+        return os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o666)
+    except (AttributeError, OSError):  # the first where this is not Linux
+        return None
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file so that it holds what it did before, or all of `text`.
 

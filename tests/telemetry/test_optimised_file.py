@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import stat
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +20,7 @@ from dcmp_hil.telemetry.rerun import sink as dashboard
 from dcmp_hil.telemetry.rerun.optimised_file import optimise
 from dcmp_hil.telemetry.rerun.sink import RerunSink
 from dcmp_hil.values import Event, EventKind, PhaseData
+from tests.live.processes import until
 from tests.telemetry.runs import VIEW, chunks, feed, read_back
 
 if TYPE_CHECKING:
@@ -90,6 +94,39 @@ def test_a_cut_in_the_midst_of_the_work_leaves_the_file_as_it_was(record: Path) 
     before = record.read_bytes()
     assert not optimise(record, 1e-3)
     assert record.read_bytes() == before
+    assert list(record.parent.iterdir()) == [record]
+
+
+_OPTIMISES = """
+import sys
+from pathlib import Path
+from dcmp_hil.telemetry.rerun import optimised_file
+optimised_file.viewer_binary = lambda: Path(sys.argv[1])
+optimised_file._FILE_BYTES_MIN = 1.0
+optimised_file.optimise(Path(sys.argv[2]), 60.0)
+"""
+
+
+def test_a_process_that_is_killed_in_the_midst_of_the_work_leaves_no_other_file(
+    record: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("program")
+    begun = folder / "begun"
+    program = _program(folder, f'head -c 2000 "$5" > "$last"; echo > {begun}; exec sleep 60')()
+    before = record.read_bytes()
+    with subprocess.Popen([sys.executable, "-c", _OPTIMISES, str(program), str(record)]) as process:
+        until(begun.exists, "the work had begun")
+        process.kill()
+    assert record.read_bytes() == before
+    assert list(record.parent.iterdir()) == [record]
+
+
+def test_it_is_rewritten_where_files_without_a_name_are_not_known(
+    record: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(os, "O_TMPFILE")
+    assert optimise(record, _PLENTY_S)
+    assert RrdReader(record).store()
     assert list(record.parent.iterdir()) == [record]
 
 

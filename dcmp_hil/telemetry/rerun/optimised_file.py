@@ -9,7 +9,7 @@ import os
 import subprocess
 from typing import TYPE_CHECKING
 
-from dcmp_hil.common.atomic_file import place_beside, whole_file
+from dcmp_hil.common.atomic_file import place_beside, unnamed_file
 from dcmp_hil.platform.disk_space import short_of, size_of
 from dcmp_hil.platform.parent_death import tied
 from dcmp_hil.telemetry.rerun.viewer import viewer_binary, viewer_environment
@@ -28,7 +28,7 @@ def optimise(file: Path, within: float, kept: float = 0.0) -> bool:
     """Rewrite a finished recording, or leave it as it is.
 
     The new file takes the place of the old one when it is whole and on the disk, so that at every moment
-    there is one or the other.
+    there is one or the other; a process that is killed leaves no other file.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def optimise(file: Path, within: float, kept: float = 0.0) -> bool:
     if place_beside(file) is None or short_of(file, size + kept):
         return False
     try:
-        with whole_file(file) as place:
+        with unnamed_file(file) as place:
             _rewrite(file, place, within)
     except (OSError, ValueError, subprocess.SubprocessError):
         return False
