@@ -217,7 +217,8 @@ def _compared(result: Result) -> ObserverComparison | None:
         for note in comparison.notes:
             console.note(note)
         if not result.columns:
-            console.note("of a run as long as this one, the last cycles are compared")
+            longest = f"{_KEPT_DURATION_MAX_S:g} s"
+            console.note(f"a run of more than {longest}, or without end, is compared over its last cycles")
     return comparison
 
 

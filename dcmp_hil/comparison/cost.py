@@ -92,6 +92,11 @@ def observer_costs(
         As for `observer_of`.
     columns
         Time (s), position (rad), voltage applied (V), shape (n,); the first 2000 rows are used.
+
+    Returns
+    -------
+    dict
+        By name; None for an observer that raises, and of fewer than 100 rows.
     """
 
     def maker(section: ObserverSection) -> Callable[[], Observer]:
@@ -100,4 +105,6 @@ def observer_costs(
     rows = zip(*(column[:_SAMPLES_MAX].tolist() for column in columns), strict=True)
     standard = cast("ObserverSection", KINDS["observer"][STANDARD].model_validate({"kind": STANDARD}))
     makers = {name: maker(section) for name, section in {STANDARD: standard, **sections}.items()}
+    if len(columns[0]) < _SLICE_SAMPLES:  # a clock cannot tell so little
+        return dict.fromkeys(makers)
     return cost_per_step(makers, [Sample(*row) for row in rows])

@@ -92,6 +92,24 @@ def test_neither_replay_nor_export_touches_what_a_recording_names(foreign: tuple
     assert (folder / "out.csv").exists()
 
 
+def test_the_cost_of_a_class_that_a_recording_names_is_not_measured(tmp_path: Path) -> None:
+    rig = bench("supervisor.start=immediate")
+    sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), _naming("observer"))
+    run(rig, duration=0.3, fast=True, sinks=[sink])
+    (tmp_path / "evil_mine.py").write_text(_EVIL)
+    command = ("replay", "run.mcap", "--set", "observer.kind=super_twisting", "--compare", "kalman")
+    done = subprocess.run(
+        [sys.executable, "-c", _WATCHED, *command, "--json", "o.json"],
+        cwd=tmp_path, env=environment(), check=False, capture_output=True, text=True, timeout=240,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "TOUCHED" not in done.stdout, done.stdout
+    assert not (tmp_path / "was_here").exists()
+    found = json.loads((tmp_path / "o.json").read_text())["comparison"]["observers"]
+    assert [one["observer"] for one in found] == ["recorded", "observer.kind=super_twisting", "kalman"]
+    assert [one["cost_us"] is None for one in found] == [True, False, False]
+
+
 def test_trust_imports_and_own_choice_replaces(script: Script, tmp_path: Path) -> None:
     rig = bench()
     sink = RecordingSink(tmp_path / "run.mcap", rig.period, about(rig), _naming("controller"))
