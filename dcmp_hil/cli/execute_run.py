@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dcmp_hil.cli import console
 from dcmp_hil.cli.comparison_table import comparison_table
+from dcmp_hil.cli.friction_offer import offer
 from dcmp_hil.cli.library_output import split_stderr
 from dcmp_hil.cli.orphaned_run import Unattended
 from dcmp_hil.cli.outputs import json_place, try_places
@@ -21,6 +22,7 @@ from dcmp_hil.cli.summary import summary_table
 from dcmp_hil.cli.viewer import chosen
 from dcmp_hil.comparison import compare_result
 from dcmp_hil.config import Rig, load_rig
+from dcmp_hil.config.edited_file import is_file
 from dcmp_hil.config.explain import warnings
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.errors import DcmpError, ExitCode, IncompleteError, TripError
@@ -87,13 +89,8 @@ def execute(rig_name: str, overrides: Sequence[str], options: Options) -> int:
     faults = inject(rig, options.faults, "--fault")
     # From here on stops are heard: opening a viewer takes its time, too.
     with StopRequest() as stop:
-        source = str(Path(rig_name).absolute()) if _is_file(rig_name) else rig_name
+        source = str(Path(rig_name).absolute()) if is_file(rig_name) else rig_name
         return _run(rig, faults, replace(options, viewer=chosen(options.viewer), source=source), stop)
-
-
-def _is_file(rig_name: str) -> bool:
-    """Return whether a rig is meant as a file, by the rule of `load_rig`."""
-    return rig_name.endswith(".toml") or "/" in rig_name
 
 
 def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
@@ -249,4 +246,5 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
             if not cut_off and _wants_picture(options):  # drawing takes seconds, and the end was asked for
                 folder.draw(result)
             folder.tell(options.record, live=options.viewer != "none")
+        offer(result.summary.friction, options.source)
     return incomplete

@@ -50,7 +50,11 @@ HELP = {
     "check": CommandHelp(
         RUN,
         "Check a rig without running it; print every key.",
-        ("dcmp-hil check bench-1khz", "dcmp-hil check my.toml --set loop.rate_hz=500"),
+        (
+            "dcmp-hil check bench-1khz",
+            "dcmp-hil check my.toml --set loop.rate_hz=500",
+            "dcmp-hil check my.toml --set model.f1_rad_s2=1.55 --write",
+        ),
     ),
     "rigs": CommandHelp(
         RUN,

@@ -30,6 +30,7 @@ def run_document(
     """Return what `--json` writes; `kept` is None where nothing is recorded, or it was not looked at."""
     return {
         **asdict(result.summary),
+        "friction": _friction(result),
         "rig": rig.name,
         "note": note,
         "faults": faults,
@@ -59,6 +60,12 @@ def write_json(target: str | None, document: dict[str, Any]) -> list[str]:
     except ConfigError as error:
         return [str(error)]
     return []
+
+
+def _friction(result: Result) -> dict[str, Any] | None:
+    """Return the friction found, and what of it is offered for the model; None where none is found."""
+    found = result.summary.friction
+    return None if found is None else asdict(found) | {"offered_rad_s2": found.offered}
 
 
 def _link(result: Result) -> dict[str, Any] | None:

@@ -38,6 +38,7 @@ _SAYS: Mapping[str, tuple[str, ...]] = {
         r".+: \d+ changes? of .+ in the run (?:is|are) not repeated here, because .*",
     ),
     "export": (r"wrote \S+",),
+    "check": (r"wrote \S+", r"\S+ says so already"),
     "rigs": (r"wrote \S+", r".*copy.*"),
     "paper": (r"wrote \S+", r"no picture: .*"),
     "view": (r"web viewer: http://127\.0\.0\.1:\d+\?url=\S+",),
@@ -69,15 +70,22 @@ def check(command: str, chosen: Mapping[str, tuple[str, ...]], called: Called, f
 def _codes(command: str, chosen: Mapping[str, tuple[str, ...]]) -> set[int]:
     if command == "run":
         return {4} if "shove" in "".join(chosen["--fault"]) else {0}
-    if command == "export":
-        return {0 if any(chosen[name] for name in ("--csv", "--parquet", "--rrd")) else _REFUSED_EXIT_CODE}
-    if command == "view":
-        return {0 if chosen["--web"] else _REFUSED_EXIT_CODE}
+    if command in {"check", "export", "view"}:
+        return {0 if _complete(command, chosen) else _REFUSED_EXIT_CODE}
     if command == "replay" or (command == "panel" and chosen["--web"]):
         return {0, _REFUSED_EXIT_CODE}
     if command == "conform":
         return {0} if chosen["--list"] or chosen["--link"] == () else {0, _REFUSED_EXIT_CODE, 3}
     return {0}
+
+
+def _complete(command: str, chosen: Mapping[str, tuple[str, ...]]) -> bool:
+    """Return whether the options say all that the command needs."""
+    if command == "export":
+        return any(chosen[name] for name in ("--csv", "--parquet", "--rrd"))
+    if command == "view":
+        return bool(chosen["--web"])
+    return not chosen["--write"] or bool(chosen["--set"] and chosen["RIG"] != ("bench-1khz",))
 
 
 def _check_lines(command: str, called: Called) -> None:
