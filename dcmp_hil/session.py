@@ -206,7 +206,7 @@ class Session:
                 self._control.close(f"{why}{end.sentence}", end.code)
             wall = 1e-9 * (self._wall.now_ns() - began_ns)
             self._realtime_factor = recorder.t / wall if wall > 0 else math.nan
-            recorder.link.finish(recorder.t)
+            recorder.tell_rest()
             ended: DeviceEnd | None = getattr(self._stages.backend, "device_end", None)
             if not why and ended and ended.fault:
                 self._tell("WARN", EventKind.DEVICE_END, ended.warning)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from dcmp_hil.errors import ConfigError
@@ -36,7 +37,7 @@ def diagnosis_of(observer: object, kind: str) -> FurtherColumns:
     """
     observer = getattr(observer, "inner", observer)  # of a class of the user's own
     names = getattr(observer, "DIAGNOSIS", ())
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+    if not isinstance(names, tuple | list) or not all(isinstance(name, str) for name in names):
         raise ConfigError(f'observer.kind = "{kind}": DIAGNOSIS is a tuple of names, such as ("bias_rad",).')
     fault = fault_of(tuple(names))
     if fault:
@@ -80,7 +81,7 @@ class DiagnosisColumns:
             found = self._diagnose()
             if type(found) is tuple and len(found) == self._count and set(map(type, found)) == {float}:
                 return found
-            numbers = [plain_number(value) for value in found]
+            numbers = [plain_number(value) for value in (found if isinstance(found, Iterable) else ())]
         except Interrupted:
             raise
         except BaseException as error:  # noqa: BLE001 - no exception of a diagnosis ends a run
@@ -89,7 +90,8 @@ class DiagnosisColumns:
         known = tuple(number for number in numbers if number is not None)
         if len(known) == len(numbers) == self._count:
             return known
-        return self._drop(cycle, f"returned {shown_value(found)}, and not {self._count} numbers")
+        wanted = f"{self._count} number{'s' * (self._count != 1)}"
+        return self._drop(cycle, f"returned {shown_value(found)}, and not {wanted}")
 
     def events(self) -> Sequence[Event]:
         """Return the event that the diagnosis was dropped, once."""

@@ -106,6 +106,11 @@ def test_a_diagnosis_that_fails_is_dropped_with_an_event_and_the_run_goes_on() -
     assert "test_diagnosis_columns.py" in told.text
 
 
+def test_a_diagnosis_that_fails_in_the_last_second_of_a_run_is_told() -> None:
+    result = run(bench(*STEADY, f"observer.kind={named(Fails)}"), duration=0.2, fast=True)
+    assert [event.t for event in result.events if "diagnosis" in event.text] == [pytest.approx(0.099)]
+
+
 @pytest.mark.parametrize(
     "found",
     [(1.0,), (1.0, 2.0, 3.0), None, 7, (1.0, "2"), ("a", "b"), SystemExit(3), ValueError("no")],
@@ -116,7 +121,8 @@ def test_what_is_no_diagnosis_is_nan_from_there_on_and_told_once(found: Any) -> 
         assert all(map(math.isnan, columns.values(cycle(t))))
     (told,) = columns.events()
     assert told.t == 1.0
-    assert told.text.startswith("The diagnosis of mine:Mine ")
+    verb = "raised" if isinstance(found, BaseException) else "returned"
+    assert told.text.startswith(f"The diagnosis of mine:Mine {verb} ")
     assert columns.events() == []
 
 
@@ -134,6 +140,7 @@ def test_numbers_of_any_kind_are_taken(found: Any) -> None:
     [
         ("bias_rad", "a tuple of names"),
         ((1, 2), "a tuple of names"),
+        (7, "a tuple of names"),
         (("position_rad",), "position_rad is there already"),
         (("bias_rad", "bias_rad"), "bias_rad is there already"),
         (("Bias",), "is no name"),
