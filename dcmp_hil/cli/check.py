@@ -56,6 +56,8 @@ def _write(rig: str, overrides: Sequence[str]) -> None:
     ConfigError
         If there are none, the rig has no file, or it cannot be edited.
     """
+    from rich.text import Text
+
     from dcmp_hil.config.edited_file import is_file, propose
 
     if not overrides:
@@ -70,5 +72,5 @@ def _write(rig: str, overrides: Sequence[str]) -> None:
         console.note(f"{rig} says so already")
         return
     proposal.write()
-    console.out.print(proposal.diff, highlight=False, markup=False, no_wrap=True)
+    console.out.print(Text(proposal.diff), no_wrap=True, overflow="ignore", crop=False)
     console.note(f"wrote {rig}")

@@ -46,7 +46,7 @@ def offer(found: FrictionFindings | None, source: str) -> None:
         return
     if diff:
         console.note(f"{said}; this would change the rig:")
-        console.err.print(Text(diff), no_wrap=True)
+        console.err.print(Text(diff), no_wrap=True, overflow="ignore", crop=False)
         console.note(
             "to write it:", shlex.join(["dcmp-hil", "check", _from_here(path), "--set", override, "--write"])
         )

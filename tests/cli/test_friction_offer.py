@@ -88,3 +88,10 @@ def test_check_writes_nothing_that_breaks_a_rule_or_has_no_file(cli: Cli, tmp_pa
         assert done.code == 2
         assert said in done.err
     assert (tmp_path / "mine.toml").read_bytes() == before
+
+
+def test_the_difference_is_shown_as_the_file_has_it(script: Script, tmp_path: Path) -> None:
+    comment = f"# :smile: [red] {'word ' * 50}END"
+    (tmp_path / "mine.toml").write_text(f"[model]\nf1_rad_s2 = 1.3 {comment}\n")
+    done = script("check", "mine.toml", "--set", "model.f1_rad_s2=1.5", "--write")
+    assert f"+f1_rad_s2 = 1.5 {comment}" in done.out.splitlines()
