@@ -1,7 +1,7 @@
 """The dashboard as the viewers draw it: python -m tools.pictures [FOLDER] [--size WxH ...].
 
 The run is in virtual time, so that every picture shows the same: a gain is changed at 11 s, and the arm is
-pushed at 13 s, which trips the run.
+pushed at 13 s, which trips the run. With --readme the panel is drawn, too.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from dcmp_hil.values import Event
 from tests.live.here import Here
 from tests.panel.browser import browser
 from tests.telemetry.pixels import coloured
+from tools.panel_picture import draw_panel
 from tools.screenshot import Seen, draw, headless_viewer, wait_until_loaded
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ README_PICTURES = {
     "dashboard-trip.png": "native-tripped-1600x900.png",
 }
 """What README and docs/dashboard.md show, by its name in docs/images."""
+_PANEL_PICTURE = "panel.png"
 _IMAGES = Path(__file__).parents[1] / "docs" / "images"
 
 
@@ -259,12 +261,17 @@ def main() -> int:
     parser.add_argument("folder", type=Path, nargs="?", default=Path("reports/pictures"))
     parser.add_argument("--size", nargs="+", default=list(SIZES), metavar="WxH", help="pixels")
     parser.add_argument("--native", action="store_true", help="no web viewer")
-    parser.add_argument("--readme", action="store_true", help="copy what the README shows to docs/images")
+    parser.add_argument(
+        "--readme",
+        action="store_true",
+        help="draw the panel, too, and renew docs/images",
+    )
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     pictures(args.folder, args.size, pages_too=not args.native)
     if args.readme:
-        for name, source in README_PICTURES.items():
+        draw_panel(args.folder / _PANEL_PICTURE)
+        for name, source in {**README_PICTURES, _PANEL_PICTURE: _PANEL_PICTURE}.items():
             shutil.copyfile(args.folder / source, _IMAGES / name)
     return 0
 
