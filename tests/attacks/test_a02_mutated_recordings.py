@@ -82,10 +82,10 @@ def _original(folder: Path, content: bytes) -> Original:
 
 @pytest.fixture(scope="module")
 def originals(tmp_path_factory: pytest.TempPathFactory) -> list[Original]:
-    """Return runs of one second: an usual one, one with other settings, one in the older layout."""
+    """Return runs of one second: an usual one, one with further columns, one in the older layout."""
     folder = tmp_path_factory.mktemp("originals")
     usual = _original(folder, _record(folder / "run.mcap"))
-    other = _record(folder / "run.mcap", "controller.kind=pd", "encoder.counts_per_rev=ideal")
+    other = _record(folder / "run.mcap", "controller.kind=pd", "observer.kind=friction_kalman")
     return [usual, _original(folder, other), _original(folder, OLDER.read_bytes())]
 
 
