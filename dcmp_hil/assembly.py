@@ -185,7 +185,7 @@ def make_controller(rig: Rig) -> Controller:
 
 
 def make_shadows(rig: Rig, kinds: Iterable[str], controller: Controller) -> Shadows:
-    """Make the observers that only run beside the loop; each has the gains of its rules.
+    """Make the observers that only run beside the loop, each as `--set observer.kind=...` makes it.
 
     They share a controller of the package, which keeps no state, so that its present gains count.
 
