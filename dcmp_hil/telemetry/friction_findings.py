@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 DISTRUST = "distrust"
 """Column of how far an observer trusts its own model: 1 wholly, and more the less."""
-_FOUND = "friction_found_rad_s2"
+_FOUND, _UNCERTAINTY = "friction_found_rad_s2", "friction_deviation_rad_s2"
 _LET_GO_ABOVE, _BACK_BELOW = 10.0, 2.0
 """Distrust above which an observer has let go of its model, and below which it is back."""
 _OFFER_DEVIATIONS, _OFFER_SHARE, _OFFER_DIGITS = 3.0, 0.05, 3
 """Difference beyond which the friction found is offered for the model: deviations, share of the model."""
 _OFFER_HELD_SHARE = 0.5  # of the window, in which the model held at the end
+_OFFER_HELD_S = 4.0  # s; in a shorter time what is found is that of the start, or of one reversal
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +44,20 @@ class FrictionFindings:
 
     held_share: float
     """Share of the window in which the model held since then, or since its beginning."""
+    held_s: float
+    """Time of that share, s."""
+    uncertainty_rad_s2: float | None
+    """Standard deviation by the observer itself in the last of these cycles; None where it has none."""
 
     @property
     def offered(self) -> float | None:
         """Friction that the model should have; None where what it has will do, or the model did not hold."""
         found, deviation = self.found_rad_s2, self.deviation_rad_s2
-        if found is None or deviation is None or self.held_share < _OFFER_HELD_SHARE:
+        held = self.held_share >= _OFFER_HELD_SHARE and self.held_s >= _OFFER_HELD_S
+        if found is None or deviation is None or not held:
             return None
         least = max(_OFFER_DEVIATIONS * deviation, _OFFER_SHARE * self.model_rad_s2)
+        least = max(least, self.uncertainty_rad_s2 or 0.0)
         far = abs(found - self.model_rad_s2) > least  # False where the model is unknown
         return float(f"{found:.{_OFFER_DIGITS}g}") if far else None
 
@@ -94,6 +101,7 @@ class FrictionStatistics:
             return
         self._known, self._model = True, block.model.f1
         t, distrust, found = (block[name][window] for name in ("t", DISTRUST, _FOUND))
+        deviation = block[_UNCERTAINTY][window] if _UNCERTAINTY in block.further else None
         self._cycles += len(t)
         was = self._hold.away
         away = self._hold.of(distrust)
@@ -105,7 +113,9 @@ class FrictionStatistics:
             elif first < end:
                 if first in turns:
                     self._restart()
-                self._add(found[first:end], distrust[first:end])
+                self._add(t[first:end], found[first:end], distrust[first:end])
+                if deviation is not None:
+                    self._uncertainty = float(deviation[end - 1])
 
     def findings(self) -> FrictionFindings | None:
         """Return the findings of the blocks so far."""
@@ -124,16 +134,23 @@ class FrictionStatistics:
             largest_distrust=self._largest if self._times else None,
             largest_distrust_t_s=self._largest_t if self._times else None,
             held_share=self._held / self._cycles,
+            held_s=self._until - self._since if self._held else 0.0,
+            uncertainty_rad_s2=self._uncertainty if math.isfinite(self._uncertainty) else None,
         )
 
     def _restart(self) -> None:
         """Begin the mean anew."""
         self._held = self._calm = 0  # cycles; those of them with a low distrust
         self._first, self._sum, self._squares = math.nan, 0.0, 0.0  # of differences from the first value
+        self._since = self._until = self._uncertainty = math.nan
 
-    def _add(self, found: NDArray[np.float64], distrust: NDArray[np.float64]) -> None:
-        """Add cycles in which the model held."""
-        self._held += len(found)
+    def _add(self, t: NDArray[np.float64], found: NDArray[np.float64], distrust: NDArray[np.float64]) -> None:
+        """Add cycles in which the model held; one whose distrust is no number says nothing of that."""
+        told = np.flatnonzero(np.isfinite(distrust))
+        if len(told):
+            self._since = self._since if self._held else float(t[told[0]])
+            self._until = float(t[told[-1]])
+            self._held += len(told)
         calm = found[(distrust < _BACK_BELOW) & np.isfinite(found)]
         if not len(calm):
             return

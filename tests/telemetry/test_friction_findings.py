@@ -70,6 +70,23 @@ def test_friction_is_not_offered_where_the_model_held_for_less_than_half_of_the_
     assert got.offered is None
 
 
+def test_friction_is_not_offered_after_less_than_four_seconds_in_which_the_model_held() -> None:
+    assert _findings(_block([2.0] * 4, [1.0] * 4)).offered is None
+    assert _findings(_block([2.0] * 5, [1.0] * 5)).offered == 2.0
+    assert _findings(_block([2.0] * 5, [1.0] * 3 + [np.nan] * 2)).offered is None
+
+
+@pytest.mark.parametrize(("uncertainty", "offered"), [(0.3, None), (0.1, 1.5), (np.nan, 1.5)])
+def test_friction_is_not_offered_where_the_observer_itself_is_less_sure_than_that(
+    uncertainty: float, offered: float | None
+) -> None:
+    two = _block([1.5] * 100, [1.0] * 100)
+    rows = np.hstack((two.rows, np.full((100, 1), uncertainty)))
+    got = _findings(Block(rows, two.model, (*_NAMES, "friction_deviation_rad_s2")))
+    assert got.offered == offered
+    assert got.held_s == 99.0
+
+
 def test_where_it_never_held_there_is_no_number() -> None:
     got = _findings(_block([2.0] * 20, [50.0] * 20))
     assert (got.found_rad_s2, got.deviation_rad_s2, got.held_share, got.offered) == (None, None, 0.0, None)
