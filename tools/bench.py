@@ -165,7 +165,7 @@ def _observer_rows() -> list[Row]:
     costs = observer_costs()
     return [
         *(_row_of(f"{kind}, one step on a ride", us, "us", "") for kind, us in costs.us.items()),
-        Row("ratio of the best, friction_kalman to super_twisting", *costs.ratio, "x", f"<= {RATIO_MAX:g}"),
+        _row_of("ratio, friction_kalman to super_twisting", costs.ratios, "x", f"<= {RATIO_MAX:g}"),
     ]
 
 

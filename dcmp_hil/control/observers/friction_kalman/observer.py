@@ -167,14 +167,14 @@ class FrictionKalman:
         rise = self._rise(y) if y != self._y else 0
         self._t, self._y, self.sticks = t, y, not direction
         if rise:
-            x = self._by_edge((x1, x2, d, f, s), p, a, rise, step)
+            x1, x2, d, f, s = self._by_edge((x1, x2, d, f, s), p, a, rise, step)
         elif off > reach or off < -reach:
             e, r = off - math.copysign(reach, off), scatter * self._unchanged_variance
-            x = self._corrected((x1, x2, d, f, s), p, (e, 0.0, r), step, False)
+            x1, x2, d, f, s = self._corrected((x1, x2, d, f, s), p, (e, 0.0, r), step, False)
         else:
-            x, self.covariance, self.trust = (x1, x2, d, f, s), p, calmed(trust, step)
+            self.covariance, self.trust = p, calmed(trust, step)
 
-        self.state = x1, x2, d, f, s = x
+        self.state = x1, x2, d, f, s
         w = d - gravity * math.sin(x1) - (f if x2 > 0.0 else -f) if x2 else -u
         return make(Estimate, (x1, x2, w))  # 0.09 us less
 
@@ -214,7 +214,7 @@ class FrictionKalman:
         x1, x2, d, f, s = x
         q, speed = self._q, abs(x2)
         span = q / speed if speed * step > q else step
-        passed = self._y - math.copysign(self._half_count, rise)
+        passed = self._y - (self._half_count if rise > 0 else -self._half_count)
         e, h = passed - x1 + 0.5 * span * x2, -0.5 * span
         r = self.trust[5] * self._edge_variance + (x2 * span) ** 2 / 12.0
         since, self._edge_t = self._t - self._edge_t, self._t
