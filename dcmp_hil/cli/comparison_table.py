@@ -11,7 +11,18 @@ from rich.text import Text
 if TYPE_CHECKING:
     from dcmp_hil.comparison import ObserverComparison, ObserverFigures
 
-_COLUMN_WIDTH_MIN = 9  # characters: a name folds, a number does not
+_NAME_WIDTH_MAX = 18  # characters; a longer name folds, a number does not
+_WHOLE_MIN = 1000.0  # larger numbers are shown without decimals
+_COLUMNS = (
+    "v error\nrad/s",
+    "w error\nrad/s²",
+    "v lag\nms",
+    "v noise\nrad/s",
+    "w noise\nrad/s²",
+    "TV\nV/s",
+    "cost\nµs",
+    "ratio",
+)
 _JUDGED = {
     "truth": "errors against the truth",
     "zero_phase": "errors against the zero-phase reference",
@@ -20,42 +31,56 @@ _JUDGED = {
 
 
 def comparison_table(comparison: ObserverComparison) -> Group:
-    """Return a table with a column for each observer; what is known of none of them has no row."""
+    """Return a table with a row for each observer; what is known of none of them has no column."""
     first, last = comparison.window_s or (0.0, 0.0)
     judged = _JUDGED[comparison.reference]
     table = Table(
         title=Text(f"observers on the same samples, {first:.2f} to {last:.2f} s; {judged}"),
         title_justify="left",
         title_style="",
+        header_style="dim",
         box=None,
-        padding=(0, 2, 0, 0),
+        padding=(0, 1, 0, 0),
     )
-    table.add_column("", no_wrap=True)
-    for one in comparison.observers:
-        name = f"{one.observer} (in the loop)" if one.closes_loop else one.observer
-        table.add_column(
-            Text(name), justify="right", style="bold", overflow="fold", min_width=_COLUMN_WIDTH_MIN
-        )
-    table.add_column(style="dim")
-    lines = [_lines(one, comparison) for one in comparison.observers]
-    for cells in zip(*lines, strict=True):
-        values = [value for _, value, _ in cells]
-        if any(value is not None for value in values):
-            what, _, unit = cells[0]
-            table.add_row(what, *("none" if value is None else f"{value:.3g}" for value in values), unit)
-    return Group("", table)
-
-
-def _lines(one: ObserverFigures, comparison: ObserverComparison) -> list[tuple[str, float | None, str]]:
-    """Return what the lines are called, the numbers of one observer, and their units."""
-    above, lag = f"above {comparison.cutoff_hz:g} Hz", one.velocity_lag_s
-    return [
-        ("velocity error, RMS", one.velocity_error_rms_rad_s, "rad/s"),
-        ("disturbance error, RMS", one.disturbance_error_rms_rad_s2, "rad/s²"),
-        ("velocity, late by", None if lag is None else 1e3 * lag, "ms"),
-        (f"velocity {above}", one.velocity_noise_rad_s, "rad/s"),
-        (f"disturbance {above}", one.disturbance_noise_rad_s2, "rad/s²"),
-        ("voltage, variation", one.voltage_tv_V_s, "V/s"),
-        ("cost of a step", one.cost_us, "µs"),
-        ("cost / super_twisting", one.cost_ratio, ""),
+    names = [f"{one.observer} *" if one.closes_loop else one.observer for one in comparison.observers]
+    table.add_column("", overflow="fold", min_width=min(_NAME_WIDTH_MAX, max(map(len, names))))
+    rows = [_numbers(one) for one in comparison.observers]
+    known = [
+        place for place, numbers in enumerate(zip(*rows, strict=True)) if any(n is not None for n in numbers)
     ]
+    for place in known:
+        table.add_column(_COLUMNS[place], justify="right", style="bold", no_wrap=True)
+    for name, numbers in zip(names, rows, strict=True):
+        table.add_row(Text(name), *(_number(numbers[place]) for place in known))
+    return Group("", table, Text(_legend(comparison), style="dim"))
+
+
+def _numbers(one: ObserverFigures) -> tuple[float | None, ...]:
+    """Return the numbers of an observer, in the order of `_COLUMNS`."""
+    lag = one.velocity_lag_s
+    return (
+        one.velocity_error_rms_rad_s,
+        one.disturbance_error_rms_rad_s2,
+        None if lag is None else 1e3 * lag,
+        one.velocity_noise_rad_s,
+        one.disturbance_noise_rad_s2,
+        one.voltage_tv_V_s,
+        one.cost_us,
+        one.cost_ratio,
+    )
+
+
+def _legend(comparison: ObserverComparison) -> str:
+    """Return what the short names of the columns mean."""
+    loop = "* closes the loop. " if any(one.closes_loop for one in comparison.observers) else ""
+    return (
+        f"{loop}v: velocity, w: disturbance. Errors and noise are RMS values,\n"
+        f"noise above {comparison.cutoff_hz:g} Hz. TV: total variation of the voltage. Cost: of one step, "
+        "and as\na ratio to super_twisting."
+    )
+
+
+def _number(value: float | None) -> str:
+    if value is None:
+        return "none"
+    return f"{value:.0f}" if abs(value) >= _WHOLE_MIN else f"{value:.3g}"
