@@ -224,11 +224,16 @@ def _draw_page(page: Chrome, picture: Path, signs: Sequence[tuple[int, int, int]
     TimeoutError
         If one of them does not appear, or the page does not come to rest.
     """
+    from selenium.common.exceptions import TimeoutException as BrowserTimeoutError
+
     clock = MonotonicClock()
     end_ns = clock.now_ns() + int(_CATCH_UP_TIMEOUT_S * 1e9)
     before = b""
     while clock.now_ns() < end_ns:
-        now = page.get_screenshot_as_png()
+        try:
+            now = page.get_screenshot_as_png()
+        except BrowserTimeoutError:  # after 10 s, on a busy computer
+            continue
         picture.write_bytes(now)
         if now == before and min(coloured(picture, sign) for sign in signs) >= _SIGN_PIXELS_MIN:
             return
