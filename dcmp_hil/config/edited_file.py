@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import os
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil.common.atomic_file import place_beside, whole_file
+from dcmp_hil.common.atomic_file import place_beside, unnamed_file
 from dcmp_hil.config.edited_text import edited_text
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+    from typing import IO
 
 _BOM = "\ufeff"
 _LINES_AROUND = 3  # of the file, shown around a change
@@ -35,7 +37,8 @@ class Proposal(NamedTuple):
             If the file is another than the diff was made from, or cannot be written.
         """
         try:
-            with whole_file(self.path) as place:
+            with self.path.open("rb") as file, unnamed_file(self.path) as place:
+                _lock(file)
                 if self.path.read_bytes() != self.before:
                     raise ConfigError(
                         f"{self.path}: it was changed meanwhile, and nothing is written. Look at the diff "
@@ -44,6 +47,24 @@ class Proposal(NamedTuple):
                 place.write_bytes(self.after)
         except OSError as error:
             raise ConfigError(f"{self.path}: {error.strerror}. Nothing is written.") from None
+
+
+def _lock(file: IO[bytes]) -> None:
+    """Keep other writers of a file away until it is closed; where it cannot be locked, go on without.
+
+    Raises
+    ------
+    BlockingIOError
+        If another one writes it.
+    """
+    try:
+        import fcntl  # not everywhere
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BlockingIOError(errno.EAGAIN, "another program is writing it") from None
+    except (ImportError, OSError):  # some file systems of a network have no locks
+        return
 
 
 def is_file(source: str) -> bool:
