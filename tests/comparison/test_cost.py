@@ -65,6 +65,14 @@ def test_the_cost_is_that_of_the_best_round() -> None:
     assert Slow.made > 6
 
 
+def test_an_observer_that_takes_50_ms_for_a_step_is_asked_a_hundred_times_at_most() -> None:
+    clock = Moved()
+    Slow.made = 2
+    samples = [Sample(k * T, 0.0, 0.0) for k in range(250)]
+    assert cost_per_step({"one": lambda: Slow(clock, 50_000_000)}, samples, clock) == {"one": 50_000.0}
+    assert (Slow.made, clock.ns) == (3, 100 * 50_000_000)
+
+
 def test_without_samples_there_is_no_cost() -> None:
     assert cost_per_step({"one": Raises}, []) == {"one": None}
 
