@@ -43,6 +43,10 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
     """
     texts = (texts,) if isinstance(texts, str) else texts
     kinds = [kind_named(part) for text in texts for part in text.split(",")]
+    if len(kinds) > _COMPARED_MAX:  # alone: a sentence for each of a thousand would hide it
+        raise ConfigError(
+            f"{option}: {len(kinds)} observers at once; at most {_COMPARED_MAX}. Leave some out."
+        )
     faults = [
         f'{option}: got "{printable(kind)}"; {for_unknown_kind("observer", kind)}'
         for kind in kinds
@@ -57,8 +61,6 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
         for kind in kinds
         if len(column_name(kind)) > _NAME_CHARS_MAX
     ]
-    if len(kinds) > _COMPARED_MAX:
-        faults.append(f"{option}: {len(kinds)} observers at once; at most {_COMPARED_MAX}. Leave some out.")
     if faults:
         raise ConfigError(*faults)
     return tuple(kinds)

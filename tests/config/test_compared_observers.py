@@ -60,3 +60,9 @@ def test_every_observer_that_does_not_fit_the_rig_is_named() -> None:
         "--compare kalman",
         "--compare friction_kalman",
     ]
+
+
+def test_a_list_that_is_far_too_long_is_refused_in_one_sentence() -> None:
+    with pytest.raises(ConfigError) as refused:
+        observer_kinds([",".join(f"k{k}" for k in range(1000))])
+    assert refused.value.faults == ("--compare: 1000 observers at once; at most 8. Leave some out.",)
