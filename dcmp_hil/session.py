@@ -15,7 +15,7 @@ from dcmp_hil.config.run_times import check_times
 from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
-from dcmp_hil.ipc.run_end import ZERO, end_after
+from dcmp_hil.ipc.run_end import NOT_OURS, ZERO, end_after
 from dcmp_hil.live.live_changes import LiveChanges
 from dcmp_hil.platform.clock import MonotonicClock, SimulatedClock
 from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
@@ -132,8 +132,7 @@ class Session:
                 mailbox=control.file if control else None,
                 further=laws.further.names,
             )
-        self._control = control
-        mailbox = control.mailbox if control else None
+        self._control, mailbox = control, control.mailbox if control else None
         self._stages, self._recorder = assemble(
             rig,
             clock,
@@ -166,12 +165,14 @@ class Session:
 
     def _run(self) -> None:
         stages, recorder = self._stages, self._recorder
-        began_ns = self._wall.now_ns()
-        end, why, reached, armed = ZERO, "", False, False
+        began_ns, end, why, reached, armed = self._wall.now_ns(), ZERO, "", False, False
         try:
             # The backend last: collecting garbage with an armed device would cost it its watchdog.
             with self._open_telemetry(), self._realtime or nullcontext():
                 self._say_where()
+                if self.stop.requested:  # while telemetry came up
+                    end = NOT_OURS
+                    return
                 began_ns, reached = self._wall.now_ns(), True
                 with self.stop.held_behind(_END_TIME_S), stages.backend:
                     armed = True

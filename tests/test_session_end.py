@@ -88,6 +88,14 @@ def test_run_keeps_its_result_when_it_is_asked_to_stop() -> None:
     assert texts_of(result)[-1] == "amplifier at 0 V"
 
 
+def test_nothing_is_armed_where_the_end_was_asked_for_before() -> None:
+    held = HeldRun(*STEADY, duration=1.0, on_read=lambda _, sample: sample)
+    held.session.stop.requested = True
+    result = held.run()
+    assert (held.reads, result.summary.periods, held.backend.live) == (0, 0, False)
+    assert texts_of(result)[-1] == "the device was not armed"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_run_ends_in_the_same_period_when_a_signal_comes(number: signal.Signals) -> None:
     assert threading.current_thread() is threading.main_thread()

@@ -108,6 +108,9 @@ def _run(rig: Rig, faults: Faults, options: Options, stop: StopRequest) -> int:
             folder.discard()
     if end.error is not None:
         raise end.error
+    if not session.began:
+        console.note(f"ended by {end.ended_by} before the first cycle: no device was armed, nothing is kept")
+        return end.code or ExitCode.INTERRUPTED
     if incomplete and end.code == 0:
         raise IncompleteError(incomplete)
     return end.code

@@ -43,7 +43,8 @@ class RunEnd(NamedTuple):
 
 ZERO = RunEnd(AT_ZERO, "INFO", "amplifier at 0 V")
 """The device was left in order."""
-_NOT_OURS = RunEnd(NOT_ARMED, "INFO", "the device was not armed")
+NOT_OURS = RunEnd(NOT_ARMED, "INFO", "the device was not armed")
+"""The run ended before it had armed the device."""
 _UNKNOWN = RunEnd(UNCONFIRMED, "ERROR", "0 V was not confirmed: the device goes there by itself")
 
 
@@ -61,7 +62,7 @@ def end_after(error: BaseException, *, reached: bool, armed: bool) -> RunEnd:
     """
     end = ZERO
     if not reached or (not armed and isinstance(error, OpenError | ConfigError)):
-        end = _NOT_OURS
+        end = NOT_OURS
     elif not armed or isinstance(error, BackendError) or getattr(error, "__notes__", None):
         end = _UNKNOWN
     return end._replace(forced=_forced_by(error))

@@ -57,6 +57,24 @@ def test_run_keeps_what_was_recorded_when_signalled(
     assert (tmp_path / "figures.json").exists()
 
 
+@pytest.mark.parametrize("options", [(), ("--compare", "kalman")])
+def test_a_run_that_is_ended_while_it_starts_keeps_all_or_nothing(
+    tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    process = _start(tmp_path, "--duration", "0", *options)
+    deadline = time.monotonic() + _TIMEOUT_S
+    while not any(tmp_path.glob("runs/*/run.mcap")) and time.monotonic() < deadline:
+        time.sleep(0.005)  # the recording is made a second before the viewer's library has loaded
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=_TIMEOUT_S)
+    if runs := list(tmp_path.glob("runs/*")):  # the signal came a second late: there was a first cycle
+        assert process.returncode == 0, err
+        assert read_run(runs[0]).complete
+    else:
+        note = "ended by SIGINT before the first cycle: no device was armed, nothing is kept\n"
+        assert (process.returncode, out, err) == (130, "", note)
+
+
 @pytest.mark.parametrize("delay", [0.002, 0.02, 0.1, 0.3])  # s: before 0 V, in the end of the run, after it
 def test_a_second_ctrl_c_loses_no_recording(tmp_path: Path, delay: float) -> None:
     process = _start(tmp_path, "--duration", "0")
