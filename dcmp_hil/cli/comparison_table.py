@@ -75,8 +75,9 @@ def _legend(comparison: ObserverComparison) -> str:
     loop = "* closes the loop. " if any(one.closes_loop for one in comparison.observers) else ""
     return (
         f"{loop}v: velocity, w: disturbance. Errors and noise are RMS values,\n"
-        f"noise above {comparison.cutoff_hz:g} Hz. TV: total variation of the voltage. Cost: of one step, "
-        "and as\na ratio to super_twisting."
+        f"noise above {comparison.cutoff_hz:g} Hz. TV: total variation of the voltage, sent (*) or "
+        "demanded.\n"
+        "Cost: of one step, and as a ratio to super_twisting."
     )
 
 

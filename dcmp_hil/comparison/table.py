@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 CUTOFF_HZ = 15.0
 """Corner of the zero-phase filters, Hz."""
+_SLOW_SHARE = 0.3  # of a period: more for one observer leaves the loop too little
 _FILTERED = ("velocity_lag_s", "velocity_noise_rad_s", "disturbance_noise_rad_s2")
 _FROM_COLUMNS = (
     "velocity_error_rms_rad_s",
@@ -170,12 +171,18 @@ def compare_observers(
     standard = costs_us.get(STANDARD)
     found = []
     for one in observers:
-        cost = costs_us.get(one.name)
+        figures = _figures(rows, one, reference, notes)
+        cost = costs_us.get(one.name) if any(value is not None for value in figures.values()) else None
+        if cost is not None and not one.closes_loop and cost > _SLOW_SHARE * 1e6 * rows.period:
+            notes[
+                f"{one.name} takes {cost:.0f} µs a step, of a period of {1e6 * rows.period:.0f} µs: beside "
+                "the loop of a run it makes cycles late."
+            ] = None
         found.append(
             ObserverFigures(
                 observer=one.name,
                 closes_loop=one.closes_loop,
-                **_figures(rows, one, reference, notes),
+                **figures,
                 cost_us=cost,
                 cost_ratio=None if cost is None or not standard else cost / standard,
             )

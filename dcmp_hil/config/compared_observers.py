@@ -47,11 +47,7 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
         raise ConfigError(
             f"{option}: {len(kinds)} observers at once; at most {_COMPARED_MAX}. Leave some out."
         )
-    faults = [
-        f'{option}: got "{printable(kind)}"; {for_unknown_kind("observer", kind)}'
-        for kind in kinds
-        if not is_kind(kind)
-    ]
+    faults = [f'{option}: got "{printable(kind)}"; {_expected(kind)}' for kind in kinds if not is_kind(kind)]
     columns = [column_name(kind) for kind in kinds]
     twice = dict.fromkeys(kind for kind in kinds if is_kind(kind) and columns.count(column_name(kind)) > 1)
     faults += [f"{option}: {kind} is given twice. Leave one out." for kind in twice]
@@ -64,6 +60,13 @@ def observer_kinds(texts: Iterable[str], option: str = OPTION) -> tuple[str, ...
     if faults:
         raise ConfigError(*faults)
     return tuple(kinds)
+
+
+def _expected(kind: str) -> str:
+    """Return what was expected in place of a word that is no kind."""
+    if "=" in kind:
+        return "expected a list of observers, such as kalman,derivative; KEY=VALUE is for `dcmp-hil replay`."
+    return for_unknown_kind("observer", kind)
 
 
 def kind_named(text: str) -> str:

@@ -54,13 +54,20 @@ def test_figures_are_those_of_the_columns() -> None:
 def test_an_observer_that_gave_up_has_no_figures_and_a_note() -> None:
     velocity = np.where(TIME < 4.0, TRUE.velocity, np.nan)
     broken = replace(BESIDE, velocity=velocity, voltage=velocity)
-    found = compare_observers(ROWS, [LOOP, broken], TRUE, {})
+    found = compare_observers(ROWS, [LOOP, broken], TRUE, {"super_twisting": 2.0, "kalman": 5.0})
     figures = found.observers[1]
     assert {value for name, value in vars(figures).items() if name not in {"observer", "closes_loop"}} == {
         None
     }
     assert known(found.observers[0].velocity_noise_rad_s) > 0.0
     assert found.notes == ("kalman has no numbers from 4.000 s on, and therefore no figures.",)
+
+
+def test_a_slow_observer_beside_the_loop_is_named_with_what_it_does_to_the_loop() -> None:
+    found = compare_observers(ROWS, [LOOP, BESIDE], TRUE, {"super_twisting": 400.0, "kalman": 320.0})
+    assert found.notes == (
+        "kalman takes 320 µs a step, of a period of 1000 µs: beside the loop of a run it makes cycles late.",
+    )
 
 
 def test_without_a_reference_there_are_noise_and_variation() -> None:

@@ -26,6 +26,7 @@ def test_kinds_are_read_from_lists_in_their_order() -> None:
         (["kalman", "Kalman"], ["kalman is given twice"]),
         (["a.b:C", "a:b_C"], ["a.b:C is given twice", "a:b_C is given twice"]),  # one name of a column
         (["kalman,"], ['got ""', "expected one of"]),
+        (["observer.kind=kalman"], ['got "observer.kind=kalman"', "KEY=VALUE is for `dcmp-hil replay`"]),
         (["custom"], ['got "custom"', 'or "module:Class" of your own']),
         (["a:b:c"], ['got "a:b:c"']),
         ([",".join(f"a:B{k}" for k in range(9))], ["9 observers at once; at most 8"]),
