@@ -33,6 +33,7 @@ _SAYS: Mapping[str, tuple[str, ...]] = {
     "replay": (
         *(r"wrote \S+", r"warning: .*", r"note: .*"),
         *(r'(?:[^:"]+: )?(?:time|position|velocity|torque|voltage): column ".*" in .* \(.*\)', r"mu0 = .*\."),
+        r"Counts per revolution: \d+ \(.*\)\. --counts-per-rev overrides it\.",
         *(r"Evenly sampled, .*\.", r"The rows are not evenly sampled: .*\.", r"The stamps are .*\."),
         r".+: The disturbance is judged by a reference with the model of this variant, .*",
         r".+: \d+ changes? of .+ in the run (?:is|are) not repeated here, because .*",
