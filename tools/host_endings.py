@@ -9,7 +9,6 @@ import signal
 import statistics
 import sys
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 """Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
+_PERIOD_US = 1_000
+_GAP_MAX_US = 10_000  # between two ticks of a device that counts; after 20 ms its host must take it for dead
 _RAISE_TIME_S = 1.2  # s, device time at which a host's own part raises
 
 _PLUGIN_SOURCE = f'''
@@ -118,13 +119,20 @@ class Ending(NamedTuple):
     said: str  # the last line on stderr
     doubt_us: int  # by which off_us may be less
     waited_us: int  # of off_us: ready to run, and its computer ran something else
+    late_us: int  # of off_us, at most: by which a tick of its device came too late
     pressed_s: float  # of gone_s: a process was ready to run on that computer and had to wait
-    tries: int
+    gap_us: int  # the longest between two ticks of its device, until it was gone
+    tries: int  # hosts that were started for it: one that was ill timed does not count
 
     @property
     def own_us(self) -> int:
         """Time that the host itself took, at least, us."""
-        return self.off_us - self.doubt_us - self.waited_us
+        return self.off_us - self.doubt_us - self.waited_us - self.late_us
+
+    @property
+    def well_timed(self) -> bool:
+        """Whether its instants are known, and its device kept its own time."""
+        return self.doubt_us <= DOUBT_MAX_US and self.gap_us <= _GAP_MAX_US
 
     @property
     def own_gone_s(self) -> float:
@@ -158,7 +166,7 @@ def end(name: str) -> Ending:
             try:
                 if is_driven(device, host):
                     ending = _end(device, host, name, folder)
-                    if ending is not None and ending.doubt_us <= DOUBT_MAX_US:
+                    if ending is not None and ending.well_timed:
                         return ending._replace(tries=tries)
             finally:
                 host.kill()
@@ -184,6 +192,7 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
         return None
     waited_ns, pressed_us = _waited_ns(host), _pressed_us()
     at_ns, before_ns = map(int, deed.read_text().split())
+    late_us = max(0, device.longest_gap_us(at_ns) - _PERIOD_US)
     deed_us, doubt_us = device.clock_us(at_ns)
     off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
     off_us = next(o.since_us for o in device.log if o.since_us > off.since_us and not o.voltage_mV)
@@ -201,7 +210,9 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
         said=said[-1] if said else "",
         doubt_us=doubt_us,
         waited_us=(waited_ns - before_ns) // 1000,
+        late_us=late_us,
         pressed_s=1e-6 * (_pressed_us() - pressed_us),
+        gap_us=device.longest_gap_us(at_ns),
         tries=1,
     )
 
@@ -222,14 +233,18 @@ def _waited_ns(host: subprocess.Popen[bytes]) -> int:
 
 _HEAD = (
     "| ended by | n | 0 V after, ms: median | max | gone after, s: max | without what others took "
-    "| kept from running, ms: max | code "
+    "| kept from running, ms: max | device late, ms: max | code "
     "| device | wrong | started again |"
 )
 
 
-def median_us(endings: list[Ending], way: str) -> float:
-    """Return how long it usually was to 0 V, us; 0 if there is none."""
-    return statistics.median([e.own_us for e in endings if e.way == way] or [0])
+def median_us(endings: list[Ending], *, signalled: bool) -> float:
+    """Return how long it usually was to 0 V, us, after a signal or an error of the host; 0 if there is none.
+
+    Ways of one kind are counted together: a few of each would not tell what is usual.
+    """
+    these = (e.own_us for e in endings if (WAYS[e.way].number is not None) == signalled)
+    return statistics.median([*these] or [0])
 
 
 def table(endings: list[Ending]) -> str:
@@ -245,6 +260,7 @@ def table(endings: list[Ending]) -> str:
             f"{max(ending.gone_s for ending in these):.1f}",
             f"{max(ending.own_gone_s for ending in these):.1f}",
             f"{max(1e-3 * ending.waited_us for ending in these):.1f}",
+            f"{max(1e-3 * ending.late_us for ending in these):.1f}",
             ", ".join(sorted({str(ending.exit_code) for ending in these})),
             ", ".join(sorted({f"{ending.state} {ending.fault}" for ending in these})),
             sum(bool(ending.wrong) for ending in these), sum(ending.tries - 1 for ending in these),
@@ -252,7 +268,7 @@ def table(endings: list[Ending]) -> str:
         rows.append(f"| {' | '.join(map(str, cells))} |")
     bounds = (
         f"bounds, by the firmware's clock: 0 V after {1e-3 * OFF_US:g} ms, the median after "
-        f"{1e-3 * USUAL_US:g} ms, less what the host was kept from running; "
+        f"{1e-3 * USUAL_US:g} ms, less what the host was kept from running and its device was late; "
         f"gone, without what others took, after {GONE_S:g} s"
     )
     return "\n".join([*rows, "", bounds])
@@ -262,15 +278,15 @@ def main() -> int:
     """Measure, print, write; 1 if a bound was broken."""
     parser = argparse.ArgumentParser(prog="python -m tools.host_endings", description=__doc__)
     parser.add_argument("--n", type=int, default=10, help="hosts of each way (default: 10)")
-    parser.add_argument("--processes", type=int, default=2, help="(default: 2)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="where the figures go as well")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="where the table goes as well")
     asked = parser.parse_args()
-    with ProcessPoolExecutor(asked.processes) as pool:
-        endings = [*pool.map(end, (name for name in WAYS for _ in range(asked.n)))]
+    endings = [end(name) for name in WAYS for _ in range(asked.n)]  # one at a time: each is timed
     said = table(endings) + "\n"
     wrong = [f"{ending.way}: {', '.join(ending.wrong)}\n" for ending in endings if ending.wrong]
-    wrong += [f"{way}: 0 V comes late\n" for way in WAYS if median_us(endings, way) > USUAL_US]
+    usual_ms = {"signals": 1e-3 * median_us(endings, signalled=True)}
+    usual_ms["errors"] = 1e-3 * median_us(endings, signalled=False)
+    wrong += [f"{kind}: 0 V after {ms:.1f} ms\n" for kind, ms in usual_ms.items() if ms > 1e-3 * USUAL_US]
     sys.stdout.write(said + "".join(wrong))
     if asked.markdown:
         asked.markdown.write_text(said, encoding="utf-8")

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import threading
 from collections import deque
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -31,6 +32,7 @@ _TICK_WAIT_MAX_MS = 2  # wall: how long a tick in plant time waits for a host th
 _ANSWER_TIMEOUT_S = 10.0  # wall: the process is gone if it takes longer
 _END_TIMEOUT_S = 2.0
 _LOG_OUTPUTS_MAX = 10_000
+_ANSWERS_KEPT = 10_000
 _UINT32_MAX = 0xFFFF_FFFF
 
 
@@ -85,6 +87,7 @@ class VirtualDevice:
         self.port = ""
         self.output = Output(self.now_us, self.now_us, self.now_us, 0, 0, 0, 0, 0, 0)
         self.log: deque[Output] = deque(maxlen=_LOG_OUTPUTS_MAX)
+        self._answered_ns: deque[int] = deque(maxlen=_ANSWERS_KEPT)
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
         self._changes = select.poll()
@@ -197,6 +200,15 @@ class VirtualDevice:
         gone_ns = (self._now_ns() if at_ns is None else at_ns) - answered_ns
         return (now_us + gone_ns // 1000) & _UINT32_MAX, (answered_ns - sent_ns) // 1000
 
+    def longest_gap_us(self, since_ns: int) -> int:
+        """Return the longest time between two ticks after an instant, us; a device of its own has its period.
+
+        A host hears nothing in that time; on a busy computer the tick itself comes late.
+        """
+        answers_ns = [at_ns for at_ns in tuple(self._answered_ns) if at_ns >= since_ns]
+        gaps_ns = (after - before for before, after in pairwise([since_ns, *answers_ns]))
+        return max(gaps_ns, default=0) // 1000
+
     @property
     def pid(self) -> int:
         """Of the firmware's process."""
@@ -230,7 +242,9 @@ class VirtualDevice:
             raise self._lost(error) from error
         while not self._listen():
             pass
-        self._ticked = (self.now_us, sent_ns, self._now_ns())
+        answered_ns = self._now_ns()
+        self._ticked = (self.now_us, sent_ns, answered_ns)
+        self._answered_ns.append(answered_ns)
 
     def _listen(self) -> bool:
         """Process the firmware's output; return whether it contained an answer to a tick."""

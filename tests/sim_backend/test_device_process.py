@@ -106,3 +106,17 @@ def test_program_that_does_not_start_is_named(tmp_path: Path, monkeypatch: pytes
     program.chmod(0o755)
     with pytest.raises(OpenError, match="no terminal left"):
         VirtualDevice(bench()).__enter__()
+
+
+def test_longest_time_between_two_ticks_is_known_from_any_instant_on() -> None:
+    clock = SimulatedClock()
+    with VirtualDevice(bench(), clock=clock) as device:
+        device.run_ticks(3)
+        assert device.longest_gap_us(clock.now_ns() - 2_000_000) == 1_000
+        clock.sleep_until_ns(clock.now_ns() + 25_000_000)  # a busy computer
+        device.run_ticks(2)
+        late_ns = clock.now_ns()
+        assert device.longest_gap_us(0) == 25_000
+        device.run_ticks(30)
+        assert device.longest_gap_us(late_ns) == 1_000
+        assert device.longest_gap_us(clock.now_ns()) == 0
