@@ -17,7 +17,7 @@ from dcmp_hil.platform.clock import MonotonicClock
 from dcmp_hil.values import Fault
 from dcmp_hil.wire.messages import State
 from sim_backend.board.virtual_device import VirtualDevice
-from tools.hosts import ATTEMPTS_MAX, DOUBT_MAX_US, WAIT_TIMEOUT_S, is_driven, start_host, wait
+from tools.hosts import ATTEMPTS_MAX, WAIT_TIMEOUT_S, is_driven, start_host, wait
 
 if TYPE_CHECKING:
     import subprocess
@@ -26,7 +26,10 @@ OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 """Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 _PERIOD_US = 1_000
-_GAP_MAX_US = 10_000  # between two ticks of a device that counts; after 20 ms its host must take it for dead
+_GAP_MAX_US = (
+    10_000  # between two ticks of its device, which explains a wrong end: after 20 ms it counts as dead
+)
+_ENDING_DOUBT_MAX_US = 5_000
 _RAISE_TIME_S = 1.2  # s, device time at which a host's own part raises
 
 _PLUGIN_SOURCE = f'''
@@ -131,8 +134,8 @@ class Ending(NamedTuple):
 
     @property
     def well_timed(self) -> bool:
-        """Whether its instants are known, and its device kept its own time."""
-        return self.doubt_us <= DOUBT_MAX_US and self.gap_us <= _GAP_MAX_US
+        """Whether its instants are known, and no device that stood still explains what is wrong."""
+        return self.doubt_us <= _ENDING_DOUBT_MAX_US and not (self.wrong and self.gap_us > _GAP_MAX_US)
 
     @property
     def own_gone_s(self) -> float:
@@ -154,6 +157,7 @@ class Ending(NamedTuple):
 
 def end(name: str) -> Ending:
     """Run a real host with a virtual device, end the host, and return the result."""
+    reasons = []
     for tries in range(1, ATTEMPTS_MAX + 1):
         with (
             tempfile.TemporaryDirectory() as place,
@@ -164,14 +168,14 @@ def end(name: str) -> Ending:
             device.start()
             host = _start(device.port, WAYS[name], folder)
             try:
-                if is_driven(device, host):
-                    ending = _end(device, host, name, folder)
-                    if ending is not None and ending.well_timed:
-                        return ending._replace(tries=tries)
+                ending = _end(device, host, name, folder) if is_driven(device, host) else None
+                if ending is not None and ending.well_timed:
+                    return ending._replace(tries=tries)
+                reasons.append(f"{ending.wrong}, {ending.gap_us} us" if ending else "ended by itself")
             finally:
                 host.kill()
                 host.communicate(timeout=WAIT_TIMEOUT_S)
-    raise RuntimeError(f"{ATTEMPTS_MAX} hosts ran into the watchdog by themselves: this computer is too busy")
+    raise RuntimeError(f"no host of {ATTEMPTS_MAX} counts, this computer is too busy: {'; '.join(reasons)}")
 
 
 def _start(port: str, way: Way, folder: Path) -> subprocess.Popen[bytes]:
@@ -239,10 +243,7 @@ _HEAD = (
 
 
 def median_us(endings: list[Ending], *, signalled: bool) -> float:
-    """Return how long it usually was to 0 V, us, after a signal or an error of the host; 0 if there is none.
-
-    Ways of one kind are counted together: a few of each would not tell what is usual.
-    """
+    """Return the median time to 0 V, us, of all ways with a signal, or of all others; 0 if there is none."""
     these = (e.own_us for e in endings if (WAYS[e.way].number is not None) == signalled)
     return statistics.median([*these] or [0])
 

@@ -66,7 +66,10 @@ def test_usual_time_to_zero_volts_is_that_of_all_signals_and_of_all_errors() -> 
     assert median_us([], signalled=True) == 0
 
 
-@pytest.mark.parametrize("changed", [{"doubt_us": 501}, {"gap_us": 10_001}])
-def test_ending_with_unknown_instants_or_a_late_device_does_not_count(changed: dict[str, int]) -> None:
+def test_ending_with_unknown_instants_or_wrong_with_a_device_that_stood_still_does_not_count() -> None:
+    late = GOOD._replace(gap_us=10_001)
     assert GOOD.well_timed
-    assert not GOOD._replace(**changed).well_timed  # type: ignore[arg-type]
+    assert late.well_timed
+    assert GOOD._replace(exit_code=3).well_timed
+    assert not late._replace(exit_code=3).well_timed
+    assert not GOOD._replace(doubt_us=5_001).well_timed
