@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -96,10 +97,15 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def _fill(connection: socket.socket) -> None:
+    """Send until neither end takes more, and the kernel has moved what it can from one to the other."""
     connection.setblocking(False)
-    with suppress(BlockingIOError):
-        while True:
-            connection.send(b"\0" * 65_536)
+    port, waiting = connection.getsockname()[1], [-1]
+    while waiting != window._unsent(port):  # noqa: SLF001 - that is what is waited for
+        waiting = window._unsent(port)  # noqa: SLF001
+        with suppress(BlockingIOError):
+            while True:
+                connection.send(b"\0" * 65_536)
+        time.sleep(0.25)
 
 
 def test_a_viewer_that_takes_nothing_is_waited_for_a_second(pauses: list[float]) -> None:
