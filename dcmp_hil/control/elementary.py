@@ -1,0 +1,99 @@
+"""Elementary functions of the law: the same bits from every compiler and from Python (numerics 2).
+
+They are made of additions, products, comparisons and exact scalings alone, which IEEE 754 defines to the last
+bit; `firmware/core/dcmp_elementary.h` is the same text in C. The polynomials are minimax fits (Remez). The
+reduction of the sine and of the exponential is that of Cody and Waite (Software Manual for the Elementary
+Functions, 1980): a constant in parts, whose products with a small whole number are exact.
+"""
+
+from __future__ import annotations
+
+from math import frexp, ldexp
+
+_ROUNDING = 6755399441055744.0  # 1.5 * 2**52: a sum with it has no bits left for a fraction
+
+_SINE_MAX_RAD = 1073741824.0  # 2**30: one bit of it is 1e-7 rad
+_ONE_OVER_PI = 0.3183098861837907
+_PI_1, _PI_2, _PI_3 = 3.1415926534682512, 1.2154201012607932e-10, 4.044532497591901e-21  # 32, 32 and 53 bits
+_HALF_PI = 1.5707963267948966
+_S0, _S1, _S2, _S3 = -0.16666666666666666, 0.00833333333333321, -0.00019841269841214512, 2.755731921199205e-06
+_S4, _S5, _S6, _S7 = (
+    -2.505210694675562e-08, 1.6058943226030913e-10, -7.643078395757952e-13, 2.722044477790634e-15,
+)  # fmt: skip
+
+_EXPONENT_MAX = 700.0
+_ONE_OVER_LN2 = 1.4426950408889634
+_LN2_1, _LN2_2 = 0.6931471805592082, 7.371002565167799e-13  # 40 and 53 bits
+_E0, _E1, _E2, _E3 = 0.5, 0.16666666666666677, 0.0416666666666667, 0.008333333333321633
+_E4, _E5, _E6, _E7 = (
+    0.0013888888888866835, 0.0001984126988612949, 2.4801587360597383e-05, 2.7557244200044336e-06,
+)  # fmt: skip
+_E8, _E9, _E10 = 2.7557242700265607e-07, 2.5109041879068726e-08, 2.0924467674204327e-09
+
+_C0, _C1, _C2, _C3 = 1.2370205743741491, -0.29720836448046895, 0.04589482882193578, -0.0025489133602668228
+_THIRD, _TWO_NINTHS, _FOURTEEN_81ST = 1 / 3, 2 / 9, 14 / 81  # series of (1 - h)**(-1/3)
+
+
+def sine(x: float) -> float:
+    """Return sin x, `x` in rad, to 2 units in the last place where the turns are below a million.
+
+    0 beyond 2**30 rad, where one bit of x is 1e-7 rad; NaN for an argument that is not finite.
+    """
+    if not -_SINE_MAX_RAD < x < _SINE_MAX_RAD:
+        return x - x
+    n = (x * _ONE_OVER_PI + _ROUNDING) - _ROUNDING
+    r = ((x - n * _PI_1) - n * _PI_2) - n * _PI_3
+    half = 0.5 * n
+    odd = half - ((half + _ROUNDING) - _ROUNDING)  # 0, or a half either way
+    z = r * r
+    tail = _S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * (_S6 + z * _S7))))))
+    return (1.0 - 8.0 * odd * odd) * (r + r * (z * tail))
+
+
+def cosine(x: float) -> float:
+    """Return cos x, `x` in rad, as the sine a quarter of a turn on: to 2e-16 and half a unit of x."""
+    return sine(x + _HALF_PI)
+
+
+def _exponential(x: float) -> tuple[float, float]:
+    """Return p = e**r - 1 and the scale 2**k, for x = k ln 2 + r, limited to +-700."""
+    x = -_EXPONENT_MAX if x < -_EXPONENT_MAX else _EXPONENT_MAX if x > _EXPONENT_MAX else x
+    k = (x * _ONE_OVER_LN2 + _ROUNDING) - _ROUNDING
+    r = (x - k * _LN2_1) - k * _LN2_2
+    # fmt: off
+    tail = _E0 + r * (_E1 + r * (_E2 + r * (_E3 + r * (_E4 + r * (_E5 + r * (_E6 + r * (
+        _E7 + r * (_E8 + r * (_E9 + r * _E10)))))))))
+    # fmt: on
+    return r + r * r * tail, ldexp(1.0, int(k))
+
+
+def expm1(x: float) -> float:
+    """Return e**x - 1 to 2 units in the last place; beyond +-700 that of 700, NaN of NaN."""
+    if x != x:
+        return x
+    p, scale = _exponential(x)
+    return scale * p + (scale - 1.0)
+
+
+def exponential(x: float) -> float:
+    """Return e**x to 2 units in the last place; beyond +-700 that of 700, NaN of NaN."""
+    if x != x:
+        return x
+    p, scale = _exponential(x)
+    return scale * p + scale
+
+
+def inverse_cube_root(x: float) -> float:
+    """Return x**(-1/3) to 2 units in the last place, for a positive normal number.
+
+    A cubic starts within 2 %; two steps of the series of (1 - h)**(-1/3), h = 1 - x y**3, end it.
+    """
+    mantissa, exponent = frexp(x)
+    third, rest = divmod(exponent + 1022, 3)
+    m = ldexp(mantissa, rest + 1)  # in [1, 8)
+    y = _C0 + m * (_C1 + m * (_C2 + m * _C3))
+    h = 1.0 - m * (y * y * y)
+    y = y + y * (h * (_THIRD + h * (_TWO_NINTHS + h * _FOURTEEN_81ST)))
+    h = 1.0 - m * (y * y * y)
+    y = y + y * (h * (_THIRD + h * _TWO_NINTHS))
+    return ldexp(y, 341 - third)
