@@ -57,7 +57,7 @@ def cosine(x: float) -> float:
 
 def _exponential(x: float) -> tuple[float, float]:
     """Return p = e**r - 1 and the scale 2**k, for x = k ln 2 + r, limited to +-700."""
-    x = -_EXPONENT_MAX if x < -_EXPONENT_MAX else _EXPONENT_MAX if x > _EXPONENT_MAX else x
+    x = -_EXPONENT_MAX if x < -_EXPONENT_MAX else min(x, _EXPONENT_MAX)
     k = (x * _ONE_OVER_LN2 + _ROUNDING) - _ROUNDING
     r = (x - k * _LN2_1) - k * _LN2_2
     # fmt: off
