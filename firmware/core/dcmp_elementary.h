@@ -1,0 +1,122 @@
+/* Elementary functions of the law without a library: additions, products, comparisons and exact scalings alone.
+ * dcmp_hil/control/elementary.py has the same operations in the same order, and says where they come from.
+ * No branches: a loop over lanes becomes vector instructions. */
+#ifndef DCMP_ELEMENTARY_H
+#define DCMP_ELEMENTARY_H
+
+#include "dcmp_real.h"
+
+/* The absolute value. */
+static inline real dcmp_magnitude(real x)
+{
+    return x < REAL(0.0) ? -x : x;
+}
+
+/* The nearest whole number, for less than DCMP_WHOLE either way. */
+static inline real dcmp_nearest(real x)
+{
+    return (x + DCMP_ROUNDING) - DCMP_ROUNDING;
+}
+
+/* The largest whole number that is not above x; NaN of NaN. */
+static inline real dcmp_floor(real x)
+{
+    const real n = dcmp_nearest(x);
+    const real below = n - REAL(1.0);
+    const real whole = n > x ? below : n;
+    return dcmp_magnitude(x) < DCMP_WHOLE ? whole : x;
+}
+
+/* sin x, x in rad: 0 beyond DCMP_SINE_MAX, NaN for an argument that is not finite. */
+static inline real dcmp_sine(real x)
+{
+    const real n = dcmp_nearest(x * REAL(0.3183098861837907));
+    const real r = ((x - n * DCMP_PI_1) - n * DCMP_PI_2) - n * DCMP_PI_3;
+    const real half = REAL(0.5) * n;
+    const real odd = half - dcmp_nearest(half); /* 0, or a half either way */
+    const real z = r * r;
+    real tail = REAL(-7.643078395757952e-13) + z * REAL(2.722044477790634e-15);
+    tail = REAL(1.6058943226030913e-10) + z * tail;
+    tail = REAL(-2.505210694675562e-08) + z * tail;
+    tail = REAL(2.755731921199205e-06) + z * tail;
+    tail = REAL(-0.00019841269841214512) + z * tail;
+    tail = REAL(0.00833333333333321) + z * tail;
+    tail = REAL(-0.16666666666666666) + z * tail;
+    const real sine = (REAL(1.0) - REAL(8.0) * odd * odd) * (r + r * (z * tail));
+    const real none = x - x;
+    return dcmp_magnitude(x) < DCMP_SINE_MAX ? sine : none;
+}
+
+/* cos x, x in rad. */
+static inline real dcmp_cosine(real x)
+{
+    return dcmp_sine(x + REAL(1.5707963267948966));
+}
+
+/* e^x = scale (1 + p), for x limited to +-DCMP_EXPONENT_MAX. */
+struct dcmp_exponential {
+    real p;
+    real scale;
+};
+
+static inline struct dcmp_exponential dcmp_exponential_of(real x)
+{
+    const real above = x > DCMP_EXPONENT_MAX ? DCMP_EXPONENT_MAX : x;
+    const real limited = x < -DCMP_EXPONENT_MAX ? -DCMP_EXPONENT_MAX : above;
+    const real sum = limited * REAL(1.4426950408889634) + DCMP_ROUNDING;
+    const real k = sum - DCMP_ROUNDING;
+    const real r = (limited - k * DCMP_LN2_1) - k * DCMP_LN2_2;
+    real tail = REAL(2.5109041879068726e-08) + r * REAL(2.0924467674204327e-09);
+    tail = REAL(2.7557242700265607e-07) + r * tail;
+    tail = REAL(2.7557244200044336e-06) + r * tail;
+    tail = REAL(2.4801587360597383e-05) + r * tail;
+    tail = REAL(0.0001984126988612949) + r * tail;
+    tail = REAL(0.0013888888888866835) + r * tail;
+    tail = REAL(0.008333333333321633) + r * tail;
+    tail = REAL(0.0416666666666667) + r * tail;
+    tail = REAL(0.16666666666666677) + r * tail;
+    tail = REAL(0.5) + r * tail;
+    /* The last bits of the sum are those of k. */
+    const union dcmp_bits whole = {.number = sum};
+    const union dcmp_bits scale = {.word = (whole.word + DCMP_EXPONENT_BIAS) << DCMP_MANTISSA_BITS};
+    const struct dcmp_exponential parts = {r + r * r * tail, scale.number};
+    return parts;
+}
+
+/* e^x - 1; NaN of NaN. */
+static inline real dcmp_expm1(real x)
+{
+    const struct dcmp_exponential parts = dcmp_exponential_of(x);
+    return parts.scale * parts.p + (parts.scale - REAL(1.0));
+}
+
+/* e^x; NaN of NaN. */
+static inline real dcmp_exp(real x)
+{
+    const struct dcmp_exponential parts = dcmp_exponential_of(x);
+    return parts.scale * parts.p + parts.scale;
+}
+
+/* x^(-1/3), for a positive normal number; NaN of NaN. */
+static inline real dcmp_inverse_cube_root(real x)
+{
+    const union dcmp_bits bits = {.number = x};
+    const dcmp_word exponent = (bits.word >> DCMP_MANTISSA_BITS) + DCMP_ROOT_SHIFT;
+    const dcmp_word third = (exponent * 21846u) >> 16;
+    const dcmp_word rest = exponent - third * 3u;
+    const dcmp_word mantissa = bits.word & ((((dcmp_word)1) << DCMP_MANTISSA_BITS) - 1u);
+    const union dcmp_bits reduced = {.word = mantissa | ((DCMP_EXPONENT_BIAS + rest) << DCMP_MANTISSA_BITS)};
+    const union dcmp_bits scale = {.word = (DCMP_EXPONENT_BIAS + DCMP_ROOT_SCALE - third) << DCMP_MANTISSA_BITS};
+    const real m = reduced.number; /* in [1, 8) */
+    real y = REAL(0.04589482882193578) + m * REAL(-0.0025489133602668228);
+    y = REAL(-0.29720836448046895) + m * y;
+    y = REAL(1.2370205743741491) + m * y;
+    real h = REAL(1.0) - m * (y * y * y);
+    y = y + y * (h * (REAL(1.0 / 3.0) + h * (REAL(2.0 / 9.0) + h * REAL(14.0 / 81.0))));
+    h = REAL(1.0) - m * (y * y * y);
+    y = y + y * (h * (REAL(1.0 / 3.0) + h * REAL(2.0 / 9.0)));
+    const real root = y * scale.number;
+    return x < REAL(0.0) || x >= REAL(0.0) ? root : x;
+}
+
+#endif
