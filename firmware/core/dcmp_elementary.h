@@ -12,6 +12,12 @@ static inline real dcmp_magnitude(real x)
     return x < REAL(0.0) ? -x : x;
 }
 
+/* The square root, which IEEE 754 defines to the last bit. Compile with -fno-math-errno: then it is one instruction. */
+static inline real dcmp_square_root(real x)
+{
+    return DCMP_SQUARE_ROOT(x);
+}
+
 /* The nearest whole number, for less than DCMP_WHOLE either way. */
 static inline real dcmp_nearest(real x)
 {
