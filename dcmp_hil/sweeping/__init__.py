@@ -1,0 +1,1 @@
+"""Sweeps: many runs of one rig in virtual time, over grids and draws of its keys."""
