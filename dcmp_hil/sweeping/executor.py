@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-class Block(NamedTuple):
+class SweepBlock(NamedTuple):
     """Consecutive runs of a sweep, which one worker runs: at least a second of work where there is as much.
 
     Parameters
@@ -49,7 +49,9 @@ class Executor(Protocol):
         """Number of blocks that run at the same time."""
         ...
 
-    def run(self, work: Callable[[Block], T], blocks: Iterable[Block]) -> Iterator[tuple[Block, T]]:
+    def run(
+        self, work: Callable[[SweepBlock], T], blocks: Iterable[SweepBlock]
+    ) -> Iterator[tuple[SweepBlock, T]]:
         """Yield each block with what `work` returned for it, in the order in which they are finished.
 
         Closing the iterator ends what runs and waits for nothing. A worker that dies changes nothing: its
