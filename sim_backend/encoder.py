@@ -6,6 +6,8 @@ import math
 import random
 from typing import TYPE_CHECKING
 
+from dcmp_hil.control.counted_random import ENCODER_NOISE, CountedRandom
+
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
 
@@ -35,15 +37,16 @@ class Encoder:
         self._noise = noise
         self._edges: list[float] = []  # counts, of each edge of a turn from its place
         if counts_per_rev and edges:
-            places = random.Random(f"edges {seed}")  # noqa: S311 - as below
+            places = random.Random(f"edges {seed}")  # noqa: S311 - a simulation must repeat itself, not be secret
             self._edges = [places.uniform(-edges, edges) for _ in range(math.ceil(counts_per_rev))]
         self._exact = not noise and not self._edges
-        self._random = random.Random(seed)  # noqa: S311 - a simulation must repeat itself, not be secret
+        self._normal = CountedRandom(seed, ENCODER_NOISE).normal
+        self._reads = 0
 
     def read(self, position: float) -> float:
         """Return the measured position, rad."""
         if self._count is None:
-            return position + self._random.gauss(0.0, self._noise) if self._noise else position
+            return position + self._drawn() if self._noise else position
         return self._count * (self.count(position) - self._phase)
 
     def count(self, position: float) -> int:
@@ -62,12 +65,17 @@ class Encoder:
     def _inexact(self, counts: float) -> int:
         """Return the counter with noise and misplaced edges, at a position in counts."""
         if self._noise:
-            counts += self._random.gauss(0.0, self._noise)
+            counts += self._drawn()
         count = math.floor(counts + 0.5)
         if self._edges:
             lower, upper = (self._edges[edge % len(self._edges)] for edge in (count, count + 1))
             count += (counts >= count + 0.5 + upper) - (counts < count - 0.5 + lower)
         return count
+
+    def _drawn(self) -> float:
+        """Return the noise of the next reading."""
+        self._reads += 1
+        return self._noise * self._normal(self._reads - 1)
 
 
 def make_encoder(rig: Rig) -> Encoder:

@@ -30,6 +30,11 @@ _E4, _E5, _E6, _E7 = (
 )  # fmt: skip
 _E8, _E9, _E10 = 2.7557242700265607e-07, 2.5109041879068726e-08, 2.0924467674204327e-09
 
+_L1, _L2, _L3, _L4 = 0.6666666666666735, 0.3999999999940942, 0.2857142874366239, 0.22222198432149784
+_L5, _L6, _L7 = 0.1818357216161805, 0.15313837699209373, 0.14798198605116586
+_LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10  # 32 and 53 bits
+_ROOT_HALF = 0.7071067811865476
+
 _C0, _C1, _C2, _C3 = 1.2370205743741491, -0.29720836448046895, 0.04589482882193578, -0.0025489133602668228
 _THIRD, _TWO_NINTHS, _FOURTEEN_81ST = 1 / 3, 2 / 9, 14 / 81  # series of (1 - h)**(-1/3)
 
@@ -97,3 +102,19 @@ def inverse_cube_root(x: float) -> float:
     h = 1.0 - m * (y * y * y)
     y = y + y * (h * (_THIRD + h * _TWO_NINTHS))
     return ldexp(y, 341 - third)
+
+
+def logarithm(x: float) -> float:
+    """Return ln x to 1 unit in the last place, for a positive normal number.
+
+    x = 2**k (1 + f), and ln(1 + f) by the series of its fraction f / (2 + f), as fdlibm has it (Sun, 1993).
+    """
+    m, exponent = frexp(x)
+    small = m < _ROOT_HALF
+    k = float(exponent - small)
+    f = (m + m if small else m) - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    tail = z * (_L1 + z * (_L2 + z * (_L3 + z * (_L4 + z * (_L5 + z * (_L6 + z * _L7))))))
+    half_square = 0.5 * f * f
+    return k * _LN2_HIGH - ((half_square - (s * (half_square + tail) + k * _LN2_LOW)) - f)
