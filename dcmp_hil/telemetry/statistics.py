@@ -74,6 +74,15 @@ class Summary:
     """Findings of an observer that finds friction by itself; None of the others."""
 
 
+def summed(total: float, values: NDArray[np.float64]) -> float:
+    """Return a total with further values added one after the other, in their order.
+
+    So a sum has the same bits on every computer, at any length of the blocks, and in a lane of a sweep. The
+    product of two arrays would take the order of the computer's own library.
+    """
+    return float(np.add.accumulate(np.concatenate(([total], values)))[-1])
+
+
 class ErrorStatistics:
     """Root mean square and maximum of a column that comes in pieces; NaN is left out."""
 
@@ -85,7 +94,7 @@ class ErrorStatistics:
         known = values[~np.isnan(values)]
         if len(known):
             self._n += len(known)
-            self._squares += float(known @ known)
+            self._squares = summed(self._squares, known * known)
             self._max = max(self._max, float(np.abs(known).max()))
 
     @property
@@ -226,5 +235,5 @@ class Statistics:
     def _add_voltage(self, voltage: NDArray[np.float64]) -> None:
         self._peak = max(self._peak, float(np.abs(voltage).max()))
         steps = np.abs(np.diff(voltage, prepend=self._last_voltage))
-        self._variation += float(np.nansum(steps))  # the very first has nothing before it
+        self._variation = summed(self._variation, steps[~np.isnan(steps)])  # nothing is before the very first
         self._last_voltage = float(voltage[-1])

@@ -107,26 +107,50 @@ static inline struct dcmp_super_twisting dcmp_super_twisting_restart(real y)
     return first;
 }
 
-/* Advance by a step of dt, s, over the voltage really applied, V, and correct by the position y, rad. */
-static inline struct dcmp_super_twisting dcmp_super_twisting_update(struct dcmp_super_twisting now,
-                                                                    struct dcmp_tuning tuning, struct dcmp_step step,
-                                                                    real dt, real y, real voltage)
+/* Advance by a step of dt, s, over the voltage really applied, V, to the position y, rad; nothing is corrected. */
+static inline struct dcmp_super_twisting dcmp_super_twisting_advance(struct dcmp_super_twisting now, real ku,
+                                                                     struct dcmp_step step, real dt, real y,
+                                                                     real voltage)
 {
-    const real u = tuning.ku * voltage;
+    const real u = ku * voltage;
     const real e0 = now.y - now.z1;
     const real e1 = y - now.z1;
     const real z1 = now.z1 + (step.h01 * e0 + step.h11 * e1 + step.f12 * now.z2 + step.gu1 * u);
     const real z2 = step.f22 * now.z2 + step.gu2 * u + step.h02 * e0 + step.h12 * e1;
     const real v1 = now.v1 + dt * (now.v2 + REAL(0.5) * dt * now.v3);
     const real v2 = now.v2 + dt * now.v3;
-    const real b = y - z1 - v1;
+    const struct dcmp_super_twisting next = {y, z1, z2, v1, v2, now.v3};
+    return next;
+}
+
+/* The innovation, rad, of a state that was advanced. */
+static inline real dcmp_innovation(struct dcmp_super_twisting now)
+{
+    return now.y - now.z1 - now.v1;
+}
+
+/* Correct a state that was advanced by its innovation b, rad. */
+static inline struct dcmp_super_twisting dcmp_super_twisting_correct(struct dcmp_super_twisting now,
+                                                                     struct dcmp_gains gains, real b)
+{
+    const struct dcmp_super_twisting next = {
+        now.y, now.z1, now.z2, now.v1 + gains.k1 * b, now.v2 + gains.k2 * b, now.v3 + gains.k3 * b};
+    return next;
+}
+
+/* Advance by a step of dt, s, over the voltage really applied, V, and correct by the position y, rad. */
+static inline struct dcmp_super_twisting dcmp_super_twisting_update(struct dcmp_super_twisting now,
+                                                                    struct dcmp_tuning tuning, struct dcmp_step step,
+                                                                    real dt, real y, real voltage)
+{
+    const struct dcmp_super_twisting ahead = dcmp_super_twisting_advance(now, tuning.ku, step, dt, y, voltage);
+    const real b = dcmp_innovation(ahead);
     const real size = dcmp_magnitude(b);
     const struct dcmp_gains sliding = dcmp_sliding_gains(size, tuning, dt);
-    const real k1 = size >= tuning.floor_from ? step.k1 : sliding.k1;
-    const real k2 = size >= tuning.floor_from ? step.k2 : sliding.k2;
-    const real k3 = size >= tuning.floor_from ? step.k3 : sliding.k3;
-    const struct dcmp_super_twisting next = {y, z1, z2, v1 + k1 * b, v2 + k2 * b, now.v3 + k3 * b};
-    return next;
+    const struct dcmp_gains gains = {size >= tuning.floor_from ? step.k1 : sliding.k1,
+                                     size >= tuning.floor_from ? step.k2 : sliding.k2,
+                                     size >= tuning.floor_from ? step.k3 : sliding.k3};
+    return dcmp_super_twisting_correct(ahead, gains, b);
 }
 
 static inline struct dcmp_estimate dcmp_super_twisting_estimate(struct dcmp_super_twisting now,
