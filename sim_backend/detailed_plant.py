@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dcmp_hil.control.elementary import exponential, sine
 from dcmp_hil.values import Truth
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class DetailedPlant:
         before = self._x2
         for _ in range(self._steps):
             before = self._x2
-            pull = plant.gravity * math.sin(self._x1) + self._cogging()
+            pull = plant.gravity * sine(self._x1) + self._cogging()
             free = before + h * (held - plant.f0 * before - pull)
             self._x2 = self._slowed(free)
             self._x1 += h * self._x2
@@ -66,12 +67,13 @@ class DetailedPlant:
         self._step *= factor
 
     def _cogging(self) -> float:
-        return self._details.cogging * math.sin(self._details.cogging_per_rev * self._x1)
+        return self._details.cogging * sine(self._details.cogging_per_rev * self._x1)
 
     def _slowed(self, free: float) -> float:
         """Return the velocity after a step, rad/s, from what it would be without Coulomb friction."""
         h, details, f1 = self._step, self._details, self._plant.f1
-        level = f1 * (1.0 + details.stribeck_ratio * math.exp(-((self._x2 / details.stribeck) ** 2)))
+        share = self._x2 / details.stribeck
+        level = f1 * (1.0 + details.stribeck_ratio * exponential(-(share * share)))
         if not details.bristle or not f1:
             return math.copysign(max(0.0, abs(free) - h * level), free)
         stiffness = f1 / details.bristle

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.control.elementary import sine
 from dcmp_hil.values import Truth
 from sim_backend.detailed_plant import DetailedPlant
 
@@ -57,14 +58,14 @@ class MoreauPlant:
     def advance(self, voltage: float) -> Truth:
         """Hold `voltage` (V) for one period and return the state at its end."""
         f0, f1, gravity, ku, *_ = self._plant
-        h, sin = self._step, math.sin
+        h = self._step
         x1, x2 = self._x1, self._x2
         held = self._plant.external(self._periods * len(self._steps) * h) + ku * voltage
         most = h * f1
         before = x2
         for _ in self._steps:
             before = x2
-            x2 += h * (held - f0 * x2 - gravity * sin(x1))
+            x2 += h * (held - f0 * x2 - gravity * sine(x1))
             x2 = x2 - most if x2 > most else x2 + most if x2 < -most else 0.0
             x1 += h * x2
         self._x1, self._x2 = x1, x2
@@ -114,7 +115,7 @@ class EulerPlant:
     def _disturbance(self, x1: float, x2: float, t: float) -> float:
         """Return w of eq. (2), rad/s2."""
         sign = math.copysign(1.0, x2) if x2 != 0.0 else 0.0
-        return -self._plant.f1 * sign + self._plant.external(t) - self._plant.gravity * math.sin(x1)
+        return -self._plant.f1 * sign + self._plant.external(t) - self._plant.gravity * sine(x1)
 
 
 def make_plant(rig: Rig) -> Plant:

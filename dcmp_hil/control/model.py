@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from dcmp_hil.control.elementary import sine
+
 
 class Model(NamedTuple):
     """Parameters of eqs. (1)-(4), all over the inertia J.
@@ -33,7 +35,7 @@ class Model(NamedTuple):
 
     def external(self, t: float) -> float:
         """Return eta/J at time `t`, rad/s2."""
-        return self.eta + self.eta_amplitude * math.sin(self.eta_rate * t)
+        return self.eta + self.eta_amplitude * sine(self.eta_rate * t)
 
 
 class PlantDetails(NamedTuple):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.control.elementary import expm1, exponential
 from dcmp_hil.values import Estimate
 
 if TYPE_CHECKING:
@@ -69,11 +69,11 @@ def held_input(f0: float, period: float) -> tuple[float, float, float]:
     tuple
         (a, p1, p2): x1 += p1 x2 + p2 d; x2 = a x2 + p1 d.
     """
-    a = math.exp(-f0 * period)
+    a = exponential(-f0 * period)
     x = f0 * period
     if x < _NEGLIGIBLE_F0_PERIOD:
         return a, period, 0.5 * period * period
-    p1 = -math.expm1(-x) / f0
+    p1 = -expm1(-x) / f0
     if x > _SERIES_F0_PERIOD_MAX:
         return a, p1, (period - p1) / f0
     # For small f0 T the closed form (T - p1)/f0 cancels; six terms are exact to double precision.

@@ -9,8 +9,9 @@ from pydantic import Field
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
+from dcmp_hil.control.elementary import inverse_cube_root
 from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
-from dcmp_hil.control.observers.discretisation import ObserverGains, copy_step, luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import ObserverGains, luenberger_copy, matched_gains
 from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
 
@@ -23,9 +24,10 @@ _MU0_RULE_RATIO_MAX = 3.0
 _BANDWIDTH_MIN_RAD_S = 4.0
 """Rad/s, of the floor: below it an arm that is led to its limits overshoots them."""
 _INNOVATION_MIN_RAD = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
+_SLOPE_MIN_RAD_S3 = 1e-30  # rad/s3: below it, M is none
 
-
-_Step = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
+_Step = tuple[float, float, float, float, float, float, float, float, float, float, float]
+"""f12 f22 gu1 gu2 h01 h02 h11 h12 of the copy in differences, and k1, k2 / T, k3 / T^2."""
 
 
 class Tuning(NamedTuple):
@@ -109,7 +111,7 @@ def bandwidth_floor(counts_per_rev: float | None, period: float) -> float:
     largest = 0.3 / period
     if counts_per_rev is None:
         return largest
-    usual: float = 40.0 * (counts_per_rev / 4096.0) ** (1 / 3) * (1e-3 / period) ** (1 / 6)
+    usual = 40.0 * inverse_cube_root(4096.0 / counts_per_rev) * math.sqrt(inverse_cube_root(period / 1e-3))
     return min(usual, largest)
 
 
@@ -186,13 +188,13 @@ class SuperTwisting:
         step = self._nominal if self._shortest < dt < self._longest else self._step(dt)
         if step is None:
             return self._restart(t, y)
-        f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12, k1, k2, k3 = step
-        u, y0 = self._ku * voltage, self._y
+        f12, f22, gu1, gu2, h01, h02, h11, h12, k1, k2, k3 = step
+        u = self._ku * voltage
         z1, z2, v2, v3 = self._z1, self._z2, self._v2, self._v3
-        z1, z2 = (
-            f11 * z1 + f12 * z2 + gu1 * u + h01 * y0 + h11 * y,
-            f21 * z1 + f22 * z2 + gu2 * u + h02 * y0 + h12 * y,
-        )
+        # In differences: y at rest and z1 = y is a rest to the last bit, in single precision as well.
+        e0, e1 = self._y - z1, y - z1
+        z1 += h01 * e0 + h11 * e1 + f12 * z2 + gu1 * u
+        z2 = f22 * z2 + gu2 * u + h02 * e0 + h12 * e1
         v1 = self._v1 + dt * (v2 + 0.5 * dt * v3)
         v2 = v2 + dt * v3
         b = y - z1 - v1
@@ -228,7 +230,7 @@ class SuperTwisting:
         self._L2 = L2
         self._w1, self._w2 = L2 + self._f0 * self._L1, self._L1 + self._f0
         # An innovation at least this large is slower than the floor.
-        cube = self.mu0**3  # 0 of a floor so small that it is none
+        cube = self.mu0 * self.mu0 * self.mu0  # 0 of a floor so small that it is none
         self._floor_from = self.M / cube if cube > 0.0 else math.inf
 
     def _restart(self, t: float, y: float) -> Estimate:
@@ -248,12 +250,13 @@ class SuperTwisting:
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
             return self._gaps[n]
         gains = _per_step(matched_gains(self.mu0 * dt), dt)
-        return (*copy_step(dt, self._f0, self._L1, self._L2), *gains)
+        return (*luenberger_copy(dt, self._f0, self._L1, self._L2).differences(), *gains)
 
     def _sliding_gains(self, b: float, dt: float) -> ObserverGains:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
-        size = abs(b)
-        mu = self.mu0 if size < _INNOVATION_MIN_RAD else (self.M / size) ** (1 / 3)
+        size, M, mu = abs(b), self.M, self.mu0
+        if size >= _INNOVATION_MIN_RAD and M >= _SLOPE_MIN_RAD_S3:
+            mu = inverse_cube_root(size / M)
         return _per_step(matched_gains(mu * dt), dt)
 
 
@@ -268,7 +271,7 @@ def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0
 
 def _solve(dt: float, f0: float, L1: float, L2: float, mu0: float) -> _Step:
     """Return the constants that depend on the step alone, as one tuple."""
-    return (*luenberger_copy(dt, f0, L1, L2), *_per_step(matched_gains(mu0 * dt), dt))
+    return (*luenberger_copy(dt, f0, L1, L2).differences(), *_per_step(matched_gains(mu0 * dt), dt))
 
 
 def _per_step(gains: ObserverGains, dt: float) -> ObserverGains:

@@ -11,12 +11,14 @@ L1, L2, KU = 4.9, 5.51, 5.4  # 1/s, 1/s2 (eq. 14); (rad/s2)/V (eq. 12)
 POLES = np.roots([1.0, 2.0, 1.5 * np.sqrt(2.0), 1.1])  # theory.md, R1 step 5, in units of mu
 
 
-def copy_step(dt: float, f0: float) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+def copy_step(
+    dt: float, f0: float, gain1: float = L1, gain2: float = L2
+) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """Return F, Gu, H0, H1 of eq. (6) over `dt` s: u held, y linear between the samples."""
     m5 = np.array(
         [
-            [-L1, 1.0, 0.0, L1, 0.0],
-            [-L2, -f0, 1.0, L2, 0.0],
+            [-gain1, 1.0, 0.0, gain1, 0.0],
+            [-gain2, -f0, 1.0, gain2, 0.0],
             [0.0, 0.0, 0.0, 0.0, 0.0],
             [0.0, 0.0, 0.0, 0.0, 1.0],
             [0.0, 0.0, 0.0, 0.0, 0.0],

@@ -5,8 +5,7 @@ The products of the same matrices with numpy cost 20 times as much (docs/observe
 
 from __future__ import annotations
 
-import math
-
+from dcmp_hil.control.elementary import cosine
 from dcmp_hil.control.observers.friction_kalman.motion import SLOPE_LEAK_1_S
 
 Covariance = tuple[
@@ -32,7 +31,7 @@ def slipped(
     (1, c, 0, 0, 0) + T/2 b with c = T/2 (1 + f0 T): so half of the products are there already.
     """
     p00, p01, p02, p03, p04, p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
-    b0, b1, b3 = -step * gravity * math.cos(x1), 1.0 - f0 * step, -direction * step
+    b0, b1, b3 = -step * gravity * cosine(x1), 1.0 - f0 * step, -direction * step
     half = 0.5 * step
     c = half * (1.0 + f0 * step)
     h0 = b0 * p00 + b1 * p01 + step * p02 + b3 * p03

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from dcmp_hil.control.elementary import sine
+
 SLOPE_LEAK_1_S = 0.3
 """1/s: the slope of the disturbance decays at this rate."""
 
@@ -39,7 +41,7 @@ def moved(
     """
     d += step * s
     s *= 1.0 - SLOPE_LEAK_1_S * step
-    a = d - gravity * math.sin(x1 + 0.5 * step * x2) + u - f0 * x2
+    a = d - gravity * sine(x1 + 0.5 * step * x2) + u - f0 * x2
     if x2 > 0.0:
         direction = 1.0
     elif x2 < 0.0:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.fast_tuple import make
+from dcmp_hil.control.elementary import sine
 from dcmp_hil.control.observers.friction_kalman.motion import moved
 from dcmp_hil.values import Estimate
 
@@ -56,7 +56,7 @@ class FrictionPredictor:
             x1, x2, d, _, _, _ = moved(x1, x2, d, f, s, self._period, u, self._f0, gravity)
         direction = reference.velocity / _CROSSING_RAD_S
         direction = -1.0 if direction < -1.0 else min(direction, 1.0)
-        w = d - gravity * math.sin(x1) - f * direction
+        w = d - gravity * sine(x1) - f * direction
         x1 = sample.position if self._measured else x1
         return make(Estimate, (x1, x2, w))  # 0.09 us less
 

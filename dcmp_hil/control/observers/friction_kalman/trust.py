@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+from dcmp_hil.control.elementary import exponential
+
 Trust = tuple[float, float, float, float, float, float]
 """m, the inflation of the disturbance's noise, 1 while the model is believed; that of its slope's noise; the
 mean of m over 0.3 s; a slow and a fast mean of the innovations over their deviation; the inflation of the
@@ -58,7 +60,7 @@ def judged(trust: Trust, nu: float, step: float, edge: bool) -> Trust:
     if target > m:
         m = min(target, _INFLATION_MAX)
     elif m != 1.0:
-        m = target + (m - target) * math.exp(-step / _DECAY_S)
+        m = target + (m - target) * exponential(-step / _DECAY_S)
     calm += (m - calm if m < calm + _CALM_STEP_MAX else _CALM_STEP_MAX) * step / _CALM_S
     return m, slope_m, calm, slow, fast, scatter
 
@@ -67,7 +69,7 @@ def calmed(trust: Trust, step: float) -> Trust:
     """Return the trust at the end of a step without an innovation."""
     m, slope_m, calm, slow, fast, scatter = trust
     if m != 1.0:
-        m = 1.0 + (m - 1.0) * math.exp(-step / _DECAY_S)
+        m = 1.0 + (m - 1.0) * exponential(-step / _DECAY_S)
     return (
         m,
         slope_m,
