@@ -29,6 +29,7 @@ typedef uint32_t dcmp_word;
 #define DCMP_LN2_1 REAL(0.693145751953125) /* ln 2 in parts: 16 bits, and the rest */
 #define DCMP_LN2_2 REAL(1.4286068203094173e-06)
 #define DCMP_SQUARE_ROOT __builtin_sqrtf
+#define DCMP_RANDOM_UNIT REAL(0x1p-24)
 #define DCMP_ROOT_SHIFT 2u             /* bias + shift is a multiple of 3 */
 #define DCMP_ROOT_SCALE 43u            /* a third of it */
 #else
@@ -47,12 +48,15 @@ typedef uint64_t dcmp_word;
 #define DCMP_LN2_1 REAL(0.6931471805592082) /* 40 and 53 bits */
 #define DCMP_LN2_2 REAL(7.371002565167799e-13)
 #define DCMP_SQUARE_ROOT __builtin_sqrt
+#define DCMP_RANDOM_UNIT REAL(0x1p-53)
 #define DCMP_ROOT_SHIFT 0u
 #define DCMP_ROOT_SCALE 341u
 #endif
 
 /* A constant of the type. */
 #define REAL(number) ((real)(number))
+
+#define DCMP_ROOT_HALF REAL(0.7071067811865476)
 
 /* A number and its bits. */
 union dcmp_bits {
