@@ -123,8 +123,9 @@ bench: $(DEV) ## measure, print a table
 
 lock: | $(BIN)/uv ## pin again after a change in pyproject.toml; ARGS=--upgrade for newer versions
 	@echo "Pinning the dependencies ..."
-	@$(COMPILE) --extra plot --extra panel --output-file requirements.txt $(ARGS)
-	@$(COMPILE) --extra plot --extra panel --extra dev --constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
+	@$(COMPILE) --extra plot --extra panel --extra sweep --output-file requirements.txt $(ARGS)
+	@$(COMPILE) --extra plot --extra panel --extra sweep --extra cluster --extra dev \
+		--constraints requirements.txt --output-file requirements-dev.txt $(ARGS)
 
 lockcheck: $(DEV) ## the locks have a wheel of everything for each Python from 3.11 to 3.14; asks the index
 	@for version in 3.11 3.12 3.13 3.14; do for lock in requirements.txt requirements-dev.txt; do \
