@@ -8,7 +8,7 @@
 
 #include "dcmp_random.h"
 
-/* ------------------------------------------------------------------------------------------------------------- plant */
+/* ----------------------------------------------------------------------------------------------------------- plant */
 
 /* The pendulum, all over the inertia J: eta/J = eta + eta_amplitude sin(eta_rate t). */
 struct dcmp_plant_model {
@@ -72,7 +72,7 @@ static inline struct dcmp_plant dcmp_plant_advance(struct dcmp_plant now, struct
     return now;
 }
 
-/* ----------------------------------------------------------------------------------------------------------- encoder */
+/* --------------------------------------------------------------------------------------------------------- encoder */
 
 struct dcmp_sim_encoder {
     real count; /* rad; 0 for an ideal encoder */
@@ -94,7 +94,7 @@ static inline real dcmp_sim_encoder_read(struct dcmp_sim_encoder encoder, real p
     return encoder.count > REAL(0.0) ? shown : ideal;
 }
 
-/* --------------------------------------------------------------------------------------------------------- amplifier */
+/* ------------------------------------------------------------------------------------------------------- amplifier */
 
 #define DCMP_SIM_DELAY_MAX 3
 
