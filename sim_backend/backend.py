@@ -49,7 +49,7 @@ class SimBackend:
         self._skips, self._lost = rig.timing.overrun == "skip", rig.sim.lost_samples
         self._has_gaps = self._skips or self._lost > 0.0
         self._tick = 0
-        self._draw = CountedRandom(rig.sim.seed, LOST_SAMPLES).uniform
+        self._chance = CountedRandom(rig.sim.seed, LOST_SAMPLES).uniform
         self._plant = faults.plant(make_plant(rig))
         self._encoder = faults.encoder(make_encoder(rig))
         self._amplifier = Amplifier(
@@ -101,7 +101,7 @@ class SimBackend:
 
         They are those whose samples are lost, and then those that are due already and skipped.
         """
-        while self._draw(tick) < self._lost:
+        while self._chance(tick) < self._lost:
             voltage, tick = self._advance(), tick + 1
         for _ in range(self._pace.missed(tick) if self._skips else 0):
             voltage, tick = self._advance(), tick + 1

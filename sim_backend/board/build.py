@@ -1,26 +1,17 @@
-"""The firmware's C sources, compiled for this computer once and kept in the user's cache."""
+"""The virtual device's library and program."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import shlex
-import shutil
-import subprocess
-import tempfile
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dcmp_hil.errors import OpenError
-from sim_backend.board import build_cache
+from sim_backend.compiling.build import SHARED, Target, compiled
 
-_PACKAGE_ROOT = Path(__file__).parents[1]
-_SOURCE_FOLDERS = (  # in the wheel; in a checkout
-    _PACKAGE_ROOT / "firmware",
-    _PACKAGE_ROOT.parent / "firmware",
-)
-_COMPILER_FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra")
-_COMPILE_TIMEOUT_S = 120
-_INSTALL_REMEDY = "apt install gcc libc6-dev"
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_WHAT = "the virtual device"
+_LIBRARY = Target(_WHAT, "libdcmp.so", ("core/*.[ch]", "boards/hostlib/*.[ch]"), SHARED)
+_PROGRAM = Target(_WHAT, "dcmp-native", ("core/*.[ch]", "boards/native/*.[ch]"), ("-D_XOPEN_SOURCE=700",))
 
 
 def library() -> Path:
@@ -31,7 +22,7 @@ def library() -> Path:
     OpenError
         If there is no compiler, it fails, or the cache cannot be written.
     """
-    return _built("hostlib", "libdcmp.so", ("-shared", "-fPIC", "-fvisibility=hidden"))
+    return compiled(_LIBRARY)
 
 
 def program() -> Path:
@@ -42,90 +33,4 @@ def program() -> Path:
     OpenError
         If there is no compiler, it fails, or the cache cannot be written.
     """
-    return _built("native", "dcmp-native", ("-D_XOPEN_SOURCE=700",))
-
-
-def sources() -> Path:
-    """Return the folder of the C sources.
-
-    Raises
-    ------
-    OpenError
-        If they were not installed.
-    """
-    for folder in _SOURCE_FOLDERS:
-        if (folder / "core").is_dir():
-            return folder
-    raise OpenError(f"{_SOURCE_FOLDERS[0]}: the firmware's sources are missing. Install dcmp-hil again.")
-
-
-def _built(board: str, name: str, flags: tuple[str, ...]) -> Path:
-    root = sources()
-    files = sorted([*root.glob("core/*.[ch]"), *root.glob(f"boards/{board}/*.[ch]")])
-    compiler = _compiler()
-    key = hashlib.sha256(repr((compiler, _version(compiler), _COMPILER_FLAGS, flags)).encode())
-    for file in files:
-        key.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    with build_cache.folder(key.hexdigest()[:16]) as folder:
-        found = build_cache.find(folder, name)
-        return found or _compile(
-            [*compiler, *_COMPILER_FLAGS, *flags, f"-I{root / 'core'}"], files, folder, name
-        )
-
-
-def _compiler() -> list[str]:
-    try:
-        asked = shlex.split(os.environ.get("CC", ""))
-    except ValueError as error:
-        raise OpenError(f"CC={os.environ['CC']}: {error}. Set CC to the name of a C compiler.") from error
-    if asked:
-        return asked
-    found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
-    if found is None:
-        raise OpenError(f"The virtual device needs a C compiler, and there is none: {_INSTALL_REMEDY}")
-    return [found]
-
-
-def _version(compiler: list[str]) -> str:
-    return _run([*compiler, "--version"])
-
-
-def _compile(command: list[str], files: list[Path], folder: Path, name: str) -> Path:
-    """Compile beside the kept file and rename: two processes at once do no harm."""
-    inputs = [str(file) for file in files if file.suffix == ".c"]
-    with tempfile.TemporaryDirectory(dir=folder) as beside:
-        made = Path(beside) / name
-        _run([*command, "-o", str(made), *inputs])
-        return build_cache.keep(made, folder)
-
-
-def _run(command: list[str]) -> str:
-    try:
-        done = subprocess.run(  # noqa: S603 - the compiler, with our own files
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_COMPILE_TIMEOUT_S,
-            check=False,
-            start_new_session=True,  # Ctrl-C is for us
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise OpenError(
-            f"{command[0]}: the C compiler cannot be run ({error}). Set CC to one that can, or: "
-            f"{_INSTALL_REMEDY}"
-        ) from error
-    if done.returncode < 0:
-        raise OpenError(
-            f"{command[0]}: the C compiler was interrupted (signal {-done.returncode}). Start again."
-        )
-    if done.returncode:
-        said = [line.strip() for line in done.stderr.splitlines() if "error" in line] or [
-            " ".join(done.stderr[-200:].split())
-        ]
-        raise OpenError(
-            f"{command[0]}: the virtual device does not compile: {said[0]}. "
-            f"If it is a header that is missing: {_INSTALL_REMEDY}"
-        )
-    return done.stdout
+    return compiled(_PROGRAM)

@@ -18,7 +18,8 @@ from dcmp_hil.device import open_errors
 from dcmp_hil.errors import ConfigError, OpenError
 from dcmp_hil.live.tunables import changed
 from dcmp_hil.platform.host_info import contention
-from sim_backend.board import build, build_cache
+from sim_backend.board import build
+from sim_backend.compiling import cache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,7 +75,7 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, needs_compiler: No
         path = tmp_path / "firmware" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text + "\n")
-    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (tmp_path / "firmware",))
+    monkeypatch.setattr("sim_backend.compiling.build._SOURCE_FOLDERS", (tmp_path / "firmware",))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return build.program
 
@@ -146,9 +147,9 @@ def test_kept_files_of_two_names_do_not_meet(tmp_path: Path) -> None:
     made = tmp_path / "dcmp-native"
     made.write_text("program")
     (tmp_path / "kept").mkdir()
-    kept = build_cache.keep(made, tmp_path / "kept")
-    assert build_cache.find(tmp_path / "kept", "dcmp-native") == kept
-    assert build_cache.find(tmp_path / "kept", "libdcmp.so") is None
+    kept = cache.keep(made, tmp_path / "kept")
+    assert cache.find(tmp_path / "kept", "dcmp-native") == kept
+    assert cache.find(tmp_path / "kept", "libdcmp.so") is None
     assert kept.exists()
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sim_backend.board import build, hostlib
+from sim_backend.board import hostlib
+from sim_backend.compiling import build
 from tests.conformance.seeded import SEEDS
 from tests.contract.firmware_device import Firmware
 from tests.contract.reference_device import ReferenceDevice

@@ -12,6 +12,7 @@ import pytest
 
 from dcmp_hil.errors import OpenError
 from sim_backend.board import build
+from sim_backend.compiling.build import sources
 from tests.firmware.core_library import WARNINGS, compiler
 
 pytestmark = pytest.mark.usefixtures("needs_compiler")
@@ -32,7 +33,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text + "\n")
-    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (tmp_path / "nowhere", root))
+    monkeypatch.setattr("sim_backend.compiling.build._SOURCE_FOLDERS", (tmp_path / "nowhere", root))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return root
 
@@ -67,8 +68,9 @@ def test_changed_source_header_or_compiler_is_compiled_anew(
 
 def test_two_processes_at_once_get_one_whole_program_each(tree: Path) -> None:
     code = (
-        "import pathlib, sys\nfrom sim_backend.board import build\n"
-        f"build._SOURCE_FOLDERS = (pathlib.Path({str(tree)!r}),)\n"
+        "import pathlib\nfrom sim_backend.board import build\n"
+        "from sim_backend.compiling import build as compiling\n"
+        f"compiling._SOURCE_FOLDERS = (pathlib.Path({str(tree)!r}),)\n"
         "print(build.program())"
     )
     running = [
@@ -172,7 +174,7 @@ def test_library_that_cannot_be_loaded_is_named(tree: Path, monkeypatch: pytest.
 
 @pytest.mark.parametrize(("board", "flags"), [("hostlib", ["-fPIC"]), ("native", ["-D_XOPEN_SOURCE=700"])])
 def test_boards_compile_without_a_warning(tmp_path: Path, board: str, flags: list[str]) -> None:
-    root = build.sources()
+    root = sources()
     warnings = [flag for flag in WARNINGS if flag != "-ffreestanding"]
     for source in sorted(root.glob(f"boards/{board}/*.c")):
         command = [compiler(), *warnings, *flags, "-O2", f"-I{root / 'core'}", "-c", str(source)]

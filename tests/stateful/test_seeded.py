@@ -15,7 +15,8 @@ from dcmp_hil.safety.limiter import Limiter
 from dcmp_hil.safety.monitors import FiniteMonitor
 from dcmp_hil.safety.supervisor import TRANSITIONS, Phase, PhaseEvent, Supervisor
 from dcmp_hil.values import Fault
-from sim_backend.board import build, hostlib
+from sim_backend.board import hostlib
+from sim_backend.compiling.build import sources
 from tests.stateful.machine import Machine
 from tests.stateful.test_machine import budget
 
@@ -115,7 +116,7 @@ def test_machine_finds_an_error_in_the_host(error: str, monkeypatch: Patch) -> N
 def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str], None]]:
     """Give a way to change the firmware's sources, for this test."""
     root = tmp_path / "firmware"
-    shutil.copytree(build.sources(), root)
+    shutil.copytree(sources(), root)
 
     def sow(file: str, old: str, new: str) -> None:
         path = root / file
@@ -124,8 +125,8 @@ def sown(tmp_path: Path, monkeypatch: Patch) -> Iterator[Callable[[str, str, str
         path.write_text(text.replace(old, new))
         hostlib.load.cache_clear()
 
-    monkeypatch.setattr("sim_backend.board.build._SOURCE_FOLDERS", (root,))
-    monkeypatch.setattr("sim_backend.board.build._COMPILER_FLAGS", ("-std=c11", "-O1"))
+    monkeypatch.setattr("sim_backend.compiling.build._SOURCE_FOLDERS", (root,))
+    monkeypatch.setattr("sim_backend.compiling.build._COMPILER_FLAGS", ("-std=c11", "-O1"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     yield sow
     hostlib.load.cache_clear()

@@ -21,15 +21,22 @@ _DIGEST_CHARS = 16  # hexadecimal digits of the content's SHA-256 in a file's na
 
 
 @contextmanager
-def folder(key: str) -> Iterator[Path]:
+def folder(key: str, what: str) -> Iterator[Path]:
     """Open the folder of one set of sources, flags and compiler; only this user may write in it.
+
+    Parameters
+    ----------
+    key
+        Name of the folder.
+    what
+        What is compiled, for messages.
 
     Raises
     ------
     OpenError
         If it cannot be made or written, or belongs to another user.
     """
-    place = _root() / key
+    place = _root(what) / key
     try:
         place.parent.parent.mkdir(parents=True, exist_ok=True)
         for one in (place.parent, place):
@@ -37,7 +44,7 @@ def folder(key: str) -> Iterator[Path]:
             _restrict(one)
         yield place
     except OSError as error:
-        raise _unwritable(place, error) from error
+        raise _unwritable(place, error, what) from error
 
 
 def find(place: Path, name: str) -> Path | None:
@@ -91,7 +98,7 @@ def _restrict(place: Path) -> None:
         place.chmod(_OWNER_ONLY_MODE)
 
 
-def _root() -> Path:
+def _root(what: str) -> Path:
     """Return the folder of what was compiled; for a user without a home one beside those of others.
 
     Raises
@@ -109,11 +116,11 @@ def _root() -> Path:
     try:
         return private(temporary())
     except OSError as error:
-        raise _unwritable(Path(error.filename or "TMPDIR"), error) from None
+        raise _unwritable(Path(error.filename or "TMPDIR"), error, what) from None
 
 
-def _unwritable(place: Path, error: OSError) -> OpenError:
+def _unwritable(place: Path, error: OSError, what: str) -> OpenError:
     return OpenError(
-        f"{place}: {error.strerror or error}. The virtual device is compiled there; point "
+        f"{place}: {error.strerror or error}. {what[0].upper()}{what[1:]} is compiled there; point "
         "XDG_CACHE_HOME at a folder you may write in."
     )

@@ -1,0 +1,1 @@
+"""C sources compiled for this computer once, and kept in a cache of the user."""
