@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from dcmp_hil.config.tables import RigTables
 
-_MOTOR_GAIN_RATIO_MIN = 0.8  # times the believed motor gain, for which the loop must be stable
-_MOTOR_GAIN_RATIO_MAX = 1.25  # the same, upper bound
-_NOISE_VOLTAGE_SHARE_MAX = 0.25
+MOTOR_GAIN_RATIO_MIN = 0.8  # times the believed motor gain, for which the loop must be stable
+MOTOR_GAIN_RATIO_MAX = 1.25  # the same, upper bound
+NOISE_VOLTAGE_SHARE_MAX = 0.25
 """Of the voltage limit, that the encoder's count alone may cost (standard deviation)."""
 _GAIN_KEYS = (
     ("loop", "rate_hz"),
@@ -68,16 +68,21 @@ def observer_limits(rig: RigTables) -> ObserverLimits:
     return ObserverLimits(rig.encoder.count, rig.supervisor.velocity_limit_rad_s, torque)
 
 
+def observer_fault(rig: RigTables) -> str:
+    """Return what the observer itself finds wrong with its gains on this rig; nothing without the watch."""
+    if rig.supervisor.monitors != "all" or not isinstance(rig.observer, ObserverSettings):
+        return ""
+    return rig.observer.fault(rig.observer_context, observer_limits(rig))
+
+
 def _fault(rig: RigTables) -> Callable[[], str] | None:
     """Return a function that describes the fault, None without one; only it computes the margins."""
     if rig.supervisor.monitors != "all":
         return None
-    if isinstance(rig.observer, ObserverSettings) and (
-        fault := rig.observer.fault(rig.observer_context, observer_limits(rig))
-    ):
+    if fault := observer_fault(rig):
         return partial(str, fault)
     for loop in loops(rig):
-        if not (loop.stable() and loop.stable(_MOTOR_GAIN_RATIO_MIN) and loop.stable(_MOTOR_GAIN_RATIO_MAX)):
+        if not (loop.stable() and loop.stable(MOTOR_GAIN_RATIO_MIN) and loop.stable(MOTOR_GAIN_RATIO_MAX)):
             return partial(_unstable, loop)
         if math.isfinite(rig.amplifier.limit) and (fault := _rough(loop, rig.amplifier.limit)):
             return partial(_told, fault, loop)
@@ -87,10 +92,10 @@ def _fault(rig: RigTables) -> Callable[[], str] | None:
 def _rough(loop: LinearLoop, limit: float) -> str:
     """Return a fault if the encoder's steps alone shake the voltage too much, in V and V/s."""
     (noise, _), variation = loop.noise_V(), loop.variation_V_s()
-    if noise > _NOISE_VOLTAGE_SHARE_MAX * limit:
+    if noise > NOISE_VOLTAGE_SHARE_MAX * limit:
         return (
             f"with these gains the encoder's steps alone make the voltage shake by {noise:.2g} V "
-            f"(standard deviation); at most {_NOISE_VOLTAGE_SHARE_MAX * limit:.3g} V, a quarter of "
+            f"(standard deviation); at most {NOISE_VOLTAGE_SHARE_MAX * limit:.3g} V, a quarter of "
             "amplifier.voltage_limit_V"
         )
     if variation >= FLOOR_V_S:
@@ -105,7 +110,7 @@ def _unstable(loop: LinearLoop) -> str:
     margins, reserve = loop.margins(), ""
     if (robust := loop.robustness()) is not None:
         reserve = f", with a margin of phase of {robust.phase_deg:.0f} degrees"
-    gains = f"{number(_MOTOR_GAIN_RATIO_MIN)} to {number(_MOTOR_GAIN_RATIO_MAX)} times"
+    gains = f"{number(MOTOR_GAIN_RATIO_MIN)} to {number(MOTOR_GAIN_RATIO_MAX)} times"
     needed = f"{gains} model.ku_rad_s2_V are needed"
     remedy = "Leave out the gains that were changed to get those that fit, or raise loop.rate_hz."
     if margins is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Self, get_args
 
-from pydantic import Discriminator, model_validator
+from pydantic import Discriminator, ValidationInfo, model_validator
 
 from dcmp_hil.config.rules import OPEN_LOOP_RULES, RULES
 from dcmp_hil.config.tables import RigTables
@@ -15,12 +15,17 @@ if TYPE_CHECKING:
     from dcmp_hil.common.section import Section
 
 
+RULES_CONTEXT = "rules"
+"""Key of the validation's context that replaces RULES, where the others are checked for many rigs at once."""
+
+
 class Rig(RigTables):
     """Settings of one rig and of its run."""
 
     @model_validator(mode="after")
-    def _check_rules(self) -> Self:
-        _check(self, RULES)
+    def _check_rules(self, info: ValidationInfo) -> Self:
+        given = info.context or {}
+        _check(self, given.get(RULES_CONTEXT, RULES))
         return self
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING
 
 from dcmp_hil.common.number_range import NumberRange, number
@@ -258,21 +259,29 @@ def within_reason(section: type[Section], key: str) -> tuple[float, float]:
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:
-    for key, field in type(section).model_fields.items():
-        value, unit = getattr(section, key), split_unit(key)[1]
-        if not isinstance(value, float) or unit not in _PLAUSIBLE_MAX:
+    for key, allowed in _plausible_ranges(type(section)):
+        value = getattr(section, key)
+        if not isinstance(value, float) or allowed.holds(value):
             continue
-        above_zero = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
-        largest = _PLAUSIBLE_MAX[unit]
-        allowed = NumberRange(_POSITIVE_MIN if above_zero else -largest, largest)
-        if allowed.holds(value):
-            continue
-        if not above_zero:  # name the bound that it is beyond
-            allowed = NumberRange(high=largest) if value > largest else NumberRange(low=-largest)
+        told = allowed
+        if allowed.low < 0.0:  # name the bound that it is beyond
+            told = NumberRange(high=allowed.high) if value > allowed.high else NumberRange(low=allowed.low)
         yield (
-            f"{name}.{key}: got {number(value)}; expected {allowed.words(in_words(unit))}. "
-            f"{field.description}"
+            f"{name}.{key}: got {number(value)}; expected {told.words(in_words(split_unit(key)[1]))}. "
+            f"{type(section).model_fields[key].description}"
         )
+
+
+@cache
+def _plausible_ranges(section: type[Section]) -> list[tuple[str, NumberRange]]:
+    """Return the keys of a table whose unit says how large they may be, and from where to where."""
+    found = []
+    for key, field in section.model_fields.items():
+        largest = _PLAUSIBLE_MAX.get(split_unit(key)[1])
+        if largest is not None:
+            above_zero = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
+            found.append((key, NumberRange(_POSITIVE_MIN if above_zero else -largest, largest)))
+    return found
 
 
 RULES: tuple[Callable[[RigTables], str], ...] = (

@@ -9,6 +9,7 @@ innovation is small; `bandwidths` says how far.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,12 +24,13 @@ if TYPE_CHECKING:
 
     from dcmp_hil.control.controllers import Gains
     from dcmp_hil.control.model import Model
+    from dcmp_hil.control.observers.discretisation import LuenbergerCopy
     from dcmp_hil.control.observers.super_twisting import Tuning
 
     Matrix = NDArray[np.float64]
 
-_STATE_COUNT = 11
-_P, _V, _APPLIED, _SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, _NOISE = range(_STATE_COUNT)
+STATE_COUNT = 11
+_P, _V, _APPLIED, SENT, _Y, _Z1, _Z2, _V1, _V2, _V3, NOISE = range(STATE_COUNT)
 _GROWTH_MIN_1_S = 0.1  # 1/s: what grows more slowly than that is a drift
 _SLIDING_INNOVATION_COUNTS = 0.15  # counts: the innovation at which the sliding term counts, M = 0.15 q mu^3
 _GAIN_DECADES = 1.0  # that are searched
@@ -36,7 +38,7 @@ _STEPS_PER_DECADE = 12
 _SEARCH_HALVINGS = 12  # refinements of the search
 _HISTORY_DOUBLINGS = 14  # 16,384 periods are looked back on: a drift has no end
 _FREQUENCY_MIN_RAD_S, _FREQUENCY_COUNT = 0.05, 2000  # rad/s; of the frequency response, up to half the rate
-_UNMODELLED_RATIO = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
+UNMODELLED_RATIO = 1.1  # simulated variation over that of the linear loop, within 4 % over 189 sets of gains
 
 
 class LoopSpec(NamedTuple):
@@ -79,6 +81,16 @@ class Robustness(NamedTuple):
     sensitivity: float  # largest magnitude of 1 / (1 + L)
 
 
+class LoopNumbers(NamedTuple):
+    """Coefficients of one period of a linear loop."""
+
+    gains: Gains
+    tuning: Tuning
+    copy: LuenbergerCopy
+    correction: tuple[float, float, float]
+    held: tuple[float, float, float]
+
+
 class LinearLoop:
     """The loop of one rig with one set of gains.
 
@@ -97,18 +109,28 @@ class LinearLoop:
     def __init__(self, spec: LoopSpec, gains: Gains, tuning: Tuning, bandwidth: float) -> None:
         self._spec, self._gains, self._tuning = spec, gains, tuning
         step = spec.period
-        self._copy = luenberger_copy(step, spec.model.f0, tuning.L1, tuning.L2)
+        self._copy = _copy_of(step, spec.model.f0, tuning.L1, tuning.L2)
         k1, k2, k3 = matched_gains(bandwidth * step)
         self._correction = (k1, k2 / step, k3 / (step * step))
         self._held = held_input(spec.model.f0, step)
 
+    @property
+    def spec(self) -> LoopSpec:
+        """Parameters of the loop."""
+        return self._spec
+
+    @property
+    def numbers(self) -> LoopNumbers:
+        """Coefficients of one period."""
+        return LoopNumbers(self._gains, self._tuning, self._copy, self._correction, self._held)
+
     def matrix(self, motor: float = 1.0) -> Matrix:
         """Return what one period does to the state, with a motor so many times as strong as believed."""
-        return self._period(np.eye(_STATE_COUNT), motor)
+        return self._period(np.eye(STATE_COUNT), motor)
 
     def radius(self, motor: float = 1.0) -> float:
         """Return the largest magnitude of an eigenvalue; infinity where there is none."""
-        matrix = self.matrix(motor)[:_NOISE, :_NOISE]
+        matrix = self.matrix(motor)[:NOISE, :NOISE]
         if not np.isfinite(matrix).all():
             return math.inf
         return float(np.abs(np.linalg.eigvals(matrix)).max())
@@ -126,7 +148,7 @@ class LinearLoop:
     def noise_V(self) -> tuple[float, float]:
         """Return the standard deviations of voltage and of its change in a period that a count costs, V."""
         matrix = self.matrix()
-        loop, drive = matrix[:_NOISE, :_NOISE], matrix[:_NOISE, _NOISE]
+        loop, drive = matrix[:NOISE, :NOISE], matrix[:NOISE, NOISE]
         with np.errstate(all="ignore"):
             power, spread = loop.copy(), np.outer(drive, drive)
             for _ in range(_HISTORY_DOUBLINGS):
@@ -135,16 +157,16 @@ class LinearLoop:
         if not np.isfinite(spread).all():
             return math.inf, math.inf
         noise = self._spec.resolution / math.sqrt(12.0)
-        now = spread[_SENT, _SENT]
-        next_ = loop[_SENT] @ spread @ loop[_SENT] + drive[_SENT] ** 2
-        both = loop[_SENT] @ spread[:, _SENT]
+        now = spread[SENT, SENT]
+        next_ = loop[SENT] @ spread @ loop[SENT] + drive[SENT] ** 2
+        both = loop[SENT] @ spread[:, SENT]
         change = max(0.0, now + next_ - 2.0 * both)
         return noise * math.sqrt(max(0.0, now)), noise * math.sqrt(change)
 
     def variation_V_s(self) -> float:
         """Return the mean of |dV/dt| that a count costs, V/s: the steps of the encoder as white noise."""
         _, change = self.noise_V()
-        return _UNMODELLED_RATIO * math.sqrt(2.0 / math.pi) * change / self._spec.period
+        return UNMODELLED_RATIO * math.sqrt(2.0 / math.pi) * change / self._spec.period
 
     def response(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return L(exp(j w T)) with the loop broken at the motor; shape (n,), of w in rad/s.
@@ -152,13 +174,13 @@ class LinearLoop:
         The state of a period is A0 + m b c with a motor m times as strong as believed, so that
         det(z - A0 - m b c) = det(z - A0) (1 + m L) with L = -c (z - A0)^-1 b.
         """
-        still = self.matrix(0.0)[:_NOISE, :_NOISE]
-        both = self.matrix(1.0)[:_NOISE, :_NOISE] - still
+        still = self.matrix(0.0)[:NOISE, :NOISE]
+        both = self.matrix(1.0)[:NOISE, :NOISE] - still
         row = both[_V]
         column = both[:, np.argmax(np.abs(row))] / row[np.argmax(np.abs(row))]
         z = np.exp(1j * frequencies * self._spec.period)
-        lines = z[:, None, None] * np.eye(_NOISE) - still
-        solved = np.linalg.solve(lines, np.broadcast_to(column, (len(z), _NOISE))[..., None])[..., 0]
+        lines = z[:, None, None] * np.eye(NOISE) - still
+        solved = np.linalg.solve(lines, np.broadcast_to(column, (len(z), NOISE))[..., None])[..., 0]
         return np.asarray(-(solved @ row), np.complex128)
 
     def robustness(self) -> Robustness | None:
@@ -203,7 +225,7 @@ class LinearLoop:
         model, step, tuning = self._spec.model, self._spec.period, self._tuning
         f11, f12, f21, f22, gu1, gu2, h01, h02, h11, h12 = self._copy
         k1, k2, k3 = self._correction
-        y, u = s[_P] + s[_NOISE], model.ku * s[_APPLIED]
+        y, u = s[_P] + s[NOISE], model.ku * s[_APPLIED]
         z1 = f11 * s[_Z1] + f12 * s[_Z2] + gu1 * u + h01 * s[_Y] + h11 * y
         z2 = f21 * s[_Z1] + f22 * s[_Z2] + gu2 * u + h02 * s[_Y] + h12 * y
         v1, v2, v3 = s[_V1] + step * (s[_V2] + 0.5 * step * s[_V3]), s[_V2] + step * s[_V3], s[_V3]
@@ -212,13 +234,13 @@ class LinearLoop:
         L1, L2, f0 = tuning.L1, tuning.L2, model.f0
         x1, x2 = z1 + v1, z2 + v2 + L1 * v1
         w = v3 + (L1 + f0) * v2 + (L2 + f0 * L1) * v1
-        voltage = self._voltage(y if self._spec.measured else x1, x2, w, s[_SENT])
-        applied = s[_SENT] if self._spec.delay_samples else voltage
+        voltage = self._voltage(y if self._spec.measured else x1, x2, w, s[SENT])
+        applied = s[SENT] if self._spec.delay_samples else voltage
         a, p1, p2 = self._held
         drive = motor * model.ku * applied
         after = np.zeros_like(s)
         after[_P], after[_V] = s[_P] + p1 * s[_V] + p2 * drive, a * s[_V] + p1 * drive
-        after[_APPLIED], after[_SENT], after[_Y] = applied, voltage, y
+        after[_APPLIED], after[SENT], after[_Y] = applied, voltage, y
         after[_Z1], after[_Z2], after[_V1], after[_V2], after[_V3] = z1, z2, v1, v2, v3
         return after
 
@@ -230,6 +252,11 @@ class LinearLoop:
             x1, x2 = x1 + p1 * x2 + p2 * drive, a * x2 + p1 * drive
         volts: Matrix = (-compensation * w - kp * x1 - kd * x2 + model.f0 * x2) / model.ku
         return volts
+
+
+@lru_cache(maxsize=64)  # the loops of a rig differ by their bandwidth, and those of a sweep often by less
+def _copy_of(step: float, f0: float, gain1: float, gain2: float) -> LuenbergerCopy:
+    return luenberger_copy(step, f0, gain1, gain2)
 
 
 def bandwidths(tuning: Tuning, count: float) -> Sequence[float]:
