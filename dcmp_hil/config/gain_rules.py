@@ -58,7 +58,7 @@ def loops(rig: RigTables) -> list[LinearLoop]:
         return []
     model, count = rig.model.values(), rig.encoder.count
     spec = LoopSpec(model, rig.period, rig.loop.delay_samples, rig.controller.position == "measured", count)
-    tuning = rig.observer.tuning(rig.observer_context)
+    tuning = rig.observer.tuning_of_a_period(rig.observer_context)
     return [LinearLoop(spec, rig.controller.gains, tuning, mu) for mu in bandwidths(tuning, count)]
 
 

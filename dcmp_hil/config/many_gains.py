@@ -21,8 +21,6 @@ from dcmp_hil.safety.chatter import FLOOR_V_S
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dcmp_hil.config.rig import Rig
     from dcmp_hil.control.stability import LinearLoop
 

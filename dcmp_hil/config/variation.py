@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from dcmp_hil.config.gain_rules import loops
 from dcmp_hil.control.controllers.pd_compensated import PdSettings
 from dcmp_hil.control.observers.super_twisting import SuperTwistingSettings
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from dcmp_hil.config.rig import Rig
+    from dcmp_hil.control.references import ReferenceSettings
 
 _VARIATION_RATIO = 10.0
 """Times the rule's, that the paper's Euler steps and an observer of one's own may cost."""
@@ -39,20 +45,28 @@ def expected_variation(rig: Rig) -> float:
 
 def _of_reference(rig: Rig) -> float:
     """Return the largest mean of |dV/dt| in a window that following the reference takes, V/s."""
-    most, step = 0.0, rig.period
-    for window in range(_WINDOW_COUNT):
-        begin = window * _HORIZON_S / _WINDOW_COUNT
-        changes = [
-            abs(_voltage(rig, t + step) - _voltage(rig, t))
-            for t in (begin + k * _WINDOW_S / _POINTS_PER_WINDOW for k in range(_POINTS_PER_WINDOW))
-        ]
-        most = max(most, sum(changes) / (_POINTS_PER_WINDOW * step))
+    model, limit, step = rig.model.values(), rig.amplifier.limit, rig.period
+    sine, v, a = _instants(rig.reference, step)
+    volts = (a + model.f0 * v + model.gravity * sine) / model.ku
+    bounded = np.maximum(-limit, np.minimum(limit, volts))
+    changes = np.abs(bounded[1] - bounded[0])
+    total = np.zeros(_WINDOW_COUNT)
+    for instant in changes.T:  # one after the other: the same bits on every computer
+        total = total + instant
+    means = total / (_POINTS_PER_WINDOW * step)
+    most = max(0.0, float(means.max()))
     return most if math.isfinite(most) else 0.0
 
 
-def _voltage(rig: Rig, t: float) -> float:
-    """Return what the believed pendulum needs to be at the reference, within the amplifier's limit, V."""
-    x, v, a = rig.reference.at(t)
-    model = rig.model.values()
-    volts = (a + model.f0 * v + model.gravity * math.sin(x)) / model.ku
-    return max(-rig.amplifier.limit, min(rig.amplifier.limit, volts))
+@lru_cache(maxsize=16)  # one reference serves thousands of runs of a sweep
+def _instants(reference: ReferenceSettings, step: float) -> NDArray[np.float64]:
+    """Return sin x, v and a of a reference, shape (3, 2, windows, points): at instants and a period later."""
+    found = np.empty((3, 2, _WINDOW_COUNT, _POINTS_PER_WINDOW))
+    for window in range(_WINDOW_COUNT):
+        begin = window * _HORIZON_S / _WINDOW_COUNT
+        for k in range(_POINTS_PER_WINDOW):
+            t = begin + k * _WINDOW_S / _POINTS_PER_WINDOW
+            for later, instant in enumerate((t, t + step)):
+                x, v, a = reference.at(instant)
+                found[:, later, window, k] = math.sin(x), v, a
+    return found

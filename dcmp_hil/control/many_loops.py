@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dcmp_hil.control.stability import LoopSpec
 
 _DOUBLINGS = 14  # as `LinearLoop.noise_V` looks back
-_NORM_MAX = 0.5  # of the power that is looked at: below 1 no eigenvalue is above 1, whatever the rounding
+_NORM_MAX = 0.5  # of the power that is looked at: below 1 no eigenvalue is above 1
 
 
 class ManyLoops(LinearLoop):

@@ -115,25 +115,24 @@ def _sentences(error: ValidationError, flat: Mapping[str, Any], place: str) -> l
 
 def _about_values(found: Mapping[str, Any], table: str, value: Any) -> tuple[int, str]:
     """Return how telling a fault of a grid or a draw is, 0 the most, and what to do about it."""
-    kind = str(found["type"])
+    kind, shape, last = str(found["type"]), _SHAPES[table], str(found["loc"][-1])
+    inside = sorted(_words(_KEY_TABLES[table]) & {str(part) for part in found["loc"]})
+    told = (5, f"got {toml_value(value)}; expected {shape}.")
     if kind == "extra_forbidden":
         known = sorted(_words(_KEY_TABLES[table]))
-        word = str(found["loc"][-1])
-        hint = did_you_mean(word, known, f"Known here: {', '.join(known)}.", shown=str)
-        return 0, f"unknown key {toml_value(word)}. {hint}"
-    if kind == "value_error":
-        return 1, str(found["ctx"]["error"])
-    if value == []:
-        return 2, "an empty range: got []. Write at least one value."
-    if kind == "greater_than_equal" and "steps" in found["loc"]:
-        return 2, f"an empty range: got steps = {found['input']}. Write at least 1."
-    given = isinstance(value, dict)
-    if kind == "missing" and given:
-        return 3, f"{found['loc'][-1]} is missing; expected {_SHAPES[table]}."
-    inside = _words(_KEY_TABLES[table]) & {str(part) for part in found["loc"]}
-    if given and inside:
-        return 4, f"got {toml_value(found['input'])} for {inside.pop()}; expected {_SHAPES[table]}."
-    return 5, f"got {toml_value(value)}; expected {_SHAPES[table]}."
+        hint = did_you_mean(last, known, f"Known here: {', '.join(known)}.", shown=str)
+        told = (0, f"unknown key {toml_value(last)}. {hint}")
+    elif kind == "value_error":
+        told = (1, str(found["ctx"]["error"]))
+    elif value == []:
+        told = (2, "an empty range: got []. Write at least one value.")
+    elif kind == "greater_than_equal" and last == "steps":
+        told = (2, f"an empty range: got steps = {found['input']}. Write at least 1.")
+    elif kind == "missing" and isinstance(value, dict):
+        told = (3, f"{last} is missing; expected {shape}.")
+    elif isinstance(value, dict) and inside:
+        told = (4, f"got {toml_value(found['input'])} for {inside[0]}; expected {shape}.")
+    return told
 
 
 def _about_key(found: Mapping[str, Any], name: str) -> str:

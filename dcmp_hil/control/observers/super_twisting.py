@@ -58,6 +58,10 @@ class SuperTwistingSettings(ObserverSettings):
         """Work out what an observer of that rig is retuned with."""
         return tune(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
 
+    def tuning_of_a_period(self, context: ObserverContext) -> Tuning:
+        """Work out the same for cycles without gaps, in a tenth of the time."""
+        return tune(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s, longest=1)
+
     def build(self, context: ObserverContext) -> SuperTwisting:
         """Make the observer for a rig."""
         return SuperTwisting(context, L1=self.L1_1_s, L2=self.L2_1_s2, M=self.M_rad_s3, mu0=self.mu0_rad_s)
@@ -86,9 +90,11 @@ class SuperTwistingSettings(ObserverSettings):
 
     def fault(self, context: ObserverContext, limits: ObserverLimits) -> str:
         """Return a fault if the differentiator can follow gravity neither by its floor nor by its slope."""
-        tuning = self.tuning(context)
+        if self.mu0_rad_s is None or self.mu0_rad_s >= _BANDWIDTH_MIN_RAD_S:
+            return ""
+        slope = slope_bound(context.counts_per_rev) if self.M_rad_s3 is None else self.M_rad_s3
         fastest = context.model.gravity * limits.velocity
-        if self.mu0_rad_s is None or tuning.mu0 >= _BANDWIDTH_MIN_RAD_S or fastest <= tuning.M:
+        if fastest <= slope:
             return ""
         return (
             f"a floor below {_BANDWIDTH_MIN_RAD_S:g} rad/s does not follow what gravity does to "
@@ -260,12 +266,23 @@ class SuperTwisting:
         return _per_step(matched_gains(mu * dt), dt)
 
 
-def tune(context: ObserverContext, *, L1: float, L2: float, M: float | None, mu0: float | None) -> Tuning:
-    """Work out every coefficient of an observer; the arguments are those of `SuperTwisting`."""
+def tune(
+    context: ObserverContext,
+    *,
+    L1: float,
+    L2: float,
+    M: float | None,
+    mu0: float | None,
+    longest: int = GAP_PERIODS_MAX,
+) -> Tuning:
+    """Work out every coefficient of an observer; the arguments are those of `SuperTwisting`.
+
+    `longest` is the longest step, in periods, that has coefficients of its own.
+    """
     counts, period, f0 = context.counts_per_rev, context.period, context.model.f0
     M = slope_bound(counts) if M is None else M
     mu0 = bandwidth_floor(counts, period) if mu0 is None else mu0
-    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, GAP_PERIODS_MAX + 1)}
+    gaps = {n: _solve(n * period, f0, L1, L2, mu0) for n in range(1, longest + 1)}
     return Tuning(L1, L2, M, mu0, gaps.pop(1), gaps)
 
 
