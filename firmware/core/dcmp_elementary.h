@@ -103,6 +103,32 @@ static inline real dcmp_exp(real x)
     return parts.scale * parts.p + parts.scale;
 }
 
+/* ln x, for a positive normal number: x = 2^k (1 + f). */
+static inline real dcmp_logarithm(real x)
+{
+    const union dcmp_bits bits = {.number = x};
+    const union dcmp_bits rounding = {.number = DCMP_ROUNDING};
+    const union dcmp_bits sum = {.word = rounding.word + (bits.word >> DCMP_MANTISSA_BITS)};
+    const real exponent = (sum.number - DCMP_ROUNDING) - (REAL(DCMP_EXPONENT_BIAS) - REAL(1.0));
+    const dcmp_word mantissa = bits.word & DCMP_MANTISSA;
+    const union dcmp_bits reduced = {.word = mantissa | ((DCMP_EXPONENT_BIAS - 1u) << DCMP_MANTISSA_BITS)};
+    const real m = reduced.number; /* in [0.5, 1) */
+    const real below = exponent - REAL(1.0);
+    const real twice = m + m;
+    const real k = m < DCMP_ROOT_HALF ? below : exponent;
+    const real f = (m < DCMP_ROOT_HALF ? twice : m) - REAL(1.0);
+    const real s = f / (REAL(2.0) + f);
+    const real z = s * s;
+    real tail = REAL(0.15313837699209373) + z * REAL(0.14798198605116586);
+    tail = REAL(0.1818357216161805) + z * tail;
+    tail = REAL(0.22222198432149784) + z * tail;
+    tail = REAL(0.2857142874366239) + z * tail;
+    tail = REAL(0.3999999999940942) + z * tail;
+    tail = z * (REAL(0.6666666666666735) + z * tail);
+    const real half_square = REAL(0.5) * f * f;
+    return k * DCMP_LN2_1 - ((half_square - (s * (half_square + tail) + k * DCMP_LN2_2)) - f);
+}
+
 /* x^(-1/3), for a positive normal number; NaN of NaN. */
 static inline real dcmp_inverse_cube_root(real x)
 {
@@ -110,7 +136,7 @@ static inline real dcmp_inverse_cube_root(real x)
     const dcmp_word exponent = (bits.word >> DCMP_MANTISSA_BITS) + DCMP_ROOT_SHIFT;
     const dcmp_word third = (exponent * 21846u) >> 16;
     const dcmp_word rest = exponent - third * 3u;
-    const dcmp_word mantissa = bits.word & ((((dcmp_word)1) << DCMP_MANTISSA_BITS) - 1u);
+    const dcmp_word mantissa = bits.word & DCMP_MANTISSA;
     const union dcmp_bits reduced = {.word = mantissa | ((DCMP_EXPONENT_BIAS + rest) << DCMP_MANTISSA_BITS)};
     const union dcmp_bits scale = {.word = (DCMP_EXPONENT_BIAS + DCMP_ROOT_SCALE - third) << DCMP_MANTISSA_BITS};
     const real m = reduced.number; /* in [1, 8) */
@@ -122,29 +148,7 @@ static inline real dcmp_inverse_cube_root(real x)
     h = REAL(1.0) - m * (y * y * y);
     y = y + y * (h * (REAL(1.0 / 3.0) + h * REAL(2.0 / 9.0)));
     const real root = y * scale.number;
-    return x < REAL(0.0) || x >= REAL(0.0) ? root : x;
-}
-
-/* ln x, for a positive normal number. */
-static inline real dcmp_logarithm(real x)
-{
-    const union dcmp_bits bits = {.number = x};
-    const dcmp_word fraction = bits.word & ((((dcmp_word)1) << DCMP_MANTISSA_BITS) - 1u);
-    const union dcmp_bits mantissa = {.word = fraction | ((dcmp_word)(DCMP_EXPONENT_BIAS - 1u) << DCMP_MANTISSA_BITS)};
-    const real m = mantissa.number; /* in [0.5, 1) */
-    const real exponent = REAL((int32_t)(bits.word >> DCMP_MANTISSA_BITS)) - REAL(DCMP_EXPONENT_BIAS - 1u);
-    const real k = m < DCMP_ROOT_HALF ? exponent - REAL(1.0) : exponent;
-    const real f = (m < DCMP_ROOT_HALF ? m + m : m) - REAL(1.0);
-    const real s = f / (REAL(2.0) + f);
-    const real z = s * s;
-    real tail = REAL(0.15313837699209373) + z * REAL(0.14798198605116586);
-    tail = REAL(0.1818357216161805) + z * tail;
-    tail = REAL(0.22222198432149784) + z * tail;
-    tail = REAL(0.2857142874366239) + z * tail;
-    tail = REAL(0.3999999999940942) + z * tail;
-    tail = z * (REAL(0.6666666666666735) + z * tail);
-    const real half_square = REAL(0.5) * f * f;
-    return k * DCMP_LN2_1 - ((half_square - (s * (half_square + tail) + k * DCMP_LN2_2)) - f);
+    return x > REAL(0.0) ? root : x;
 }
 
 #endif

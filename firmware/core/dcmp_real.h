@@ -18,7 +18,7 @@ typedef float real;
 typedef uint32_t dcmp_word;
 
 #define DCMP_MANTISSA_BITS 23
-#define DCMP_EXPONENT_BIAS 127u
+#define DCMP_EXPONENT_BIAS ((dcmp_word)127)
 #define DCMP_ROUNDING REAL(0x1.8p23)   /* a sum with it has no bits left for a fraction */
 #define DCMP_WHOLE REAL(0x1p22)        /* from here on the sum with it is not exact */
 #define DCMP_SINE_MAX REAL(65536.0)    /* rad */
@@ -37,7 +37,7 @@ typedef double real;
 typedef uint64_t dcmp_word;
 
 #define DCMP_MANTISSA_BITS 52
-#define DCMP_EXPONENT_BIAS 1023u
+#define DCMP_EXPONENT_BIAS ((dcmp_word)1023)
 #define DCMP_ROUNDING REAL(0x1.8p52)
 #define DCMP_WHOLE REAL(0x1p51)
 #define DCMP_SINE_MAX REAL(1073741824.0) /* rad; one bit of it is 1e-7 rad */
@@ -52,6 +52,8 @@ typedef uint64_t dcmp_word;
 #define DCMP_ROOT_SHIFT 0u
 #define DCMP_ROOT_SCALE 341u
 #endif
+
+#define DCMP_MANTISSA ((((dcmp_word)1) << DCMP_MANTISSA_BITS) - 1u)
 
 /* A constant of the type. */
 #define REAL(number) ((real)(number))

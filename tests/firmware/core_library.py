@@ -25,6 +25,8 @@ WARNINGS = [
     *("-std=c11", "-ffreestanding", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow"),
     *("-Wundef", "-Wstrict-prototypes", "-Werror"),
 ]
+LAW = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+"""What the headers of the law ask for; the rest of the core has no floating point."""
 BUILDS = {
     "plain": ["-O2"],
     "sanitized": [
@@ -59,6 +61,19 @@ def app_sources() -> list[Path]:
     return sorted(APP.glob("*.c"))
 
 
+def check_sources() -> list[Path]:
+    """Return the C files of the tests, which the law's headers are compiled in."""
+    return sorted(HERE.glob("*_checks.c"))
+
+
+def law_headers() -> dict[Path, Path]:
+    """Return the headers that hold code, each with the file of the tests that uses all of it."""
+    found = (
+        (path, HERE / f"{path.stem.removeprefix('dcmp_')}_checks.c") for path in sorted(CORE.glob("*.h"))
+    )
+    return {header: check for header, check in found if check.exists() and check.stem != "core_checks"}
+
+
 def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
     """Compile the core and more files, each into an object of its own."""
     objects = []
@@ -67,6 +82,7 @@ def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
         command = [
             compiler(),
             *WARNINGS,
+            *LAW,
             *flags,
             "-fPIC",
             f"-I{CORE}",
@@ -83,7 +99,7 @@ def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
 
 def build(folder: Path, kind: str) -> Path:
     """Build the library of one kind; return its path."""
-    objects = compile_all(folder, BUILDS[kind], HERE / "core_checks.c")
+    objects = compile_all(folder, BUILDS[kind], *check_sources())
     library = folder / f"libcore_{kind}.so"
     subprocess.run(
         [compiler(), "-shared", *BUILDS[kind], *map(str, objects), "-o", str(library)], check=True, cwd=folder
@@ -96,7 +112,8 @@ def declarations() -> str:
     """Return every declaration of the core, preprocessed without the system's headers, which cffi knows."""
     folders = [f"-I{folder}" for folder in (CORE, APP, HERE, HERE / "no_headers")]
     command = [compiler(), "-E", "-P", "-nostdinc", "-D_Atomic=", *folders, "-"]  # cffi knows no _Atomic
-    text = '#include "core_checks.h"\n#include "app.h"\n#include "boot_count.h"\n'
+    text = '#include "core_checks.h"\n#include "app.h"\n#include "boot_count.h"\n#include "law_checks.h"\n'
+    text += '#define DCMP_REAL_FLOAT\n#include "law_checks.h"\n'
     return subprocess.run(command, check=True, input=text, capture_output=True, text=True).stdout
 
 

@@ -1,0 +1,42 @@
+/* The law's headers behind functions for the tests: columns in, columns out, `n` rows. Numbers are doubles on this side;
+ * each check file is compiled once for each type. No guard: Python reads it once for each type. */
+#include <stdint.h>
+
+#undef CHECK
+#ifdef DCMP_REAL_FLOAT
+#define CHECK(name) check_float_##name
+#else
+#define CHECK(name) check_##name
+#endif
+
+/* dcmp_elementary.h: out = f(x) */
+void CHECK(magnitude)(const double *x, double *out, uint32_t n);
+void CHECK(square_root)(const double *x, double *out, uint32_t n);
+void CHECK(nearest)(const double *x, double *out, uint32_t n);
+void CHECK(floor)(const double *x, double *out, uint32_t n);
+void CHECK(sine)(const double *x, double *out, uint32_t n);
+void CHECK(cosine)(const double *x, double *out, uint32_t n);
+void CHECK(expm1)(const double *x, double *out, uint32_t n);
+void CHECK(exponential)(const double *x, double *out, uint32_t n);
+void CHECK(logarithm)(const double *x, double *out, uint32_t n);
+void CHECK(inverse_cube_root)(const double *x, double *out, uint32_t n);
+
+/* dcmp_control.h */
+void CHECK(matched_gains)(const double *x, double *out, uint32_t n);
+void CHECK(step_periods)(const double *lengths, const double *dt, int32_t *out, uint32_t n);
+/* Rows of t, y, voltage; estimates come out. `steps` has 11 numbers for each of 1 to 10 periods; `others` those of the steps
+ * of another length, in their order. Time that stands still leaves all as it was. */
+void CHECK(super_twisting)(const double *tuning, const double *steps, const double *others, const double *lengths,
+                           const double *samples, double *out, uint32_t n);
+void CHECK(ahead)(const double *predictor, const double *rows, double *out, uint32_t n); /* x1 x2 w V */
+void CHECK(pd_voltage)(const double *pd, const double *rows, double *out, uint32_t n);   /* xr vr ar x1 x2 w */
+/* Velocities, rad/s, and voltages; friction and the told voltage come out, and a disturbance of 1 rad/s2 made whole. */
+void CHECK(known_friction)(double f1, double volts, const double *rows, double *out, uint32_t n);
+
+/* dcmp_friction_kalman.h */
+void CHECK(moved)(const double *rows, double *out, uint32_t n);  /* x1 x2 d f s step u f0 gravity */
+void CHECK(judged)(const double *rows, double *out, uint32_t n); /* the trust, nu, step, edge */
+/* Rows of t, y, voltage, voltage under way, velocity of the reference; of each come out the estimate, the state, the
+ * covariance, the trust, sticks, steps, and the state ahead after `delay` periods. */
+void CHECK(friction_kalman)(const double *setup, double period, uint32_t delay, const double *rows, double *out,
+                            uint32_t n);
