@@ -148,11 +148,8 @@ def _encoder_shows_faults(rig: RigTables) -> str:
 
 def _limits_leave_room(rig: RigTables) -> str:
     """Refuse limits that the start alone would pass: the probe's two pushes, and an arm that swings back."""
-    limits = rig.supervisor
-    if limits.monitors != "all":
-        return ""
-    faults = []
-    if limits.start == "immediate" or limits.probe == "off":
+    limits, faults = rig.supervisor, []
+    if limits.monitors != "all" or limits.start == "immediate" or limits.probe == "off":
         return ""
     if limits.position_limit_rad < _POSITION_LIMIT_MIN_RAD:
         faults.append(
@@ -259,17 +256,14 @@ def within_reason(section: type[Section], key: str) -> tuple[float, float]:
 
 
 def _beyond_reason(name: str, section: Section) -> Iterator[str]:
-    for key, allowed in _plausible_ranges(type(section)):
-        value = getattr(section, key)
+    for key, plausible in _plausible_ranges(type(section)):
+        value, allowed = getattr(section, key), plausible
         if not isinstance(value, float) or allowed.holds(value):
             continue
-        told = allowed
         if allowed.low < 0.0:  # name the bound that it is beyond
-            told = NumberRange(high=allowed.high) if value > allowed.high else NumberRange(low=allowed.low)
-        yield (
-            f"{name}.{key}: got {number(value)}; expected {told.words(in_words(split_unit(key)[1]))}. "
-            f"{type(section).model_fields[key].description}"
-        )
+            allowed = NumberRange(high=allowed.high) if value > allowed.high else NumberRange(allowed.low)
+        expected, field = allowed.words(in_words(split_unit(key)[1])), type(section).model_fields[key]
+        yield f"{name}.{key}: got {number(value)}; expected {expected}. {field.description}"
 
 
 @cache
@@ -277,11 +271,10 @@ def _plausible_ranges(section: type[Section]) -> list[tuple[str, NumberRange]]:
     """Return the keys of a table whose unit says how large they may be, and from where to where."""
     found = []
     for key, field in section.model_fields.items():
-        largest = _PLAUSIBLE_MAX.get(split_unit(key)[1])
-        if largest is not None:
-            above_zero = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
-            found.append((key, NumberRange(_POSITIVE_MIN if above_zero else -largest, largest)))
-    return found
+        largest = _PLAUSIBLE_MAX.get(split_unit(key)[1], math.nan)
+        positive = any(getattr(bound, "gt", None) == 0 for bound in field.metadata)
+        found.append((key, NumberRange(_POSITIVE_MIN if positive else -largest, largest)))
+    return [(key, allowed) for key, allowed in found if not math.isnan(allowed.high)]
 
 
 RULES: tuple[Callable[[RigTables], str], ...] = (
