@@ -39,7 +39,8 @@ class Law:
     """
 
     def __init__(self, core: Core, kind: str = "") -> None:
-        self._ffi, self._lib, self._kind = core.ffi, core.lib, kind
+        self._ffi: Any = core.ffi
+        self._lib, self._kind = core.lib, kind
 
     def __call__(self, name: str, *given: Any, width: int = 1, rows: int | None = None) -> Array:
         """Call a check; the last array given has a row for each of the results, which are `width` wide."""
