@@ -26,9 +26,8 @@ OFF_US, USUAL_US, GONE_S = 50_000, 3_000, 2.0
 """Until 0 V, each and the median: a period until the loop looks, one for its 0 V, one until it is applied."""
 _WATCHDOG_MS = 50  # of no matter here, and a busy computer is not to meet it
 _PERIOD_US = 1_000
-_GAP_MAX_US = (
-    10_000  # between two ticks of its device, which explains a wrong end: after 20 ms it counts as dead
-)
+_GAP_MAX_US = 10_000
+"""Between two ticks of its device. More explains a wrong end: after 20 ms a host takes it for dead."""
 _ENDING_DOUBT_MAX_US = 5_000
 _RAISE_TIME_S = 1.2  # s, device time at which a host's own part raises
 

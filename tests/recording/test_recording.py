@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
-import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +35,6 @@ from tests.helpers import bench
 from tests.telemetry.runs import EVENTS, blocks, cycle, truth
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from dcmp_hil.telemetry.block import Block
 
 LOST_S = 0.1
@@ -162,8 +161,20 @@ while True:
 """
 
 
+def _waited_s(process: subprocess.Popen[bytes]) -> float:
+    """Return how long the threads of a process were ready to run, and its computer ran something else, s."""
+    waited_ns = 0
+    for thread in Path(f"/proc/{process.pid}/task").iterdir():
+        with suppress(OSError):  # one that ends just now
+            waited_ns += int((thread / "schedstat").read_text().split()[1])
+    return 1e-9 * waited_ns
+
+
 def _killed(folder: Path, rate: int) -> float:
-    """Write rows for half a second, kill the recording process; return the age of the oldest row lost, s."""
+    """Write rows for half a second, kill the recording process; return the age of the oldest row lost, s.
+
+    The time that a busy computer did not let that process run is left out.
+    """
     import mmap
 
     capacity = 1 << 15
@@ -176,17 +187,17 @@ def _killed(folder: Path, rate: int) -> float:
         while not (folder / "up").exists():
             assert time.monotonic() < end
             time.sleep(0.01)
-        pushed: list[float] = []  # s, when each row came
+        pushed: list[float] = []  # s, when each row came, less what the process had waited for a processor
         began = time.monotonic()
         while len(pushed) < 0.5 * rate:
-            now = time.monotonic()
+            now, own = time.monotonic(), time.monotonic() - _waited_s(process)
             for k in range(len(pushed), int((now - began) * rate)):
                 row = cycle(k)
                 ring.push(row._replace(sample=row.sample._replace(t=k / rate)), truth(k))
-                pushed.append(now)
+                pushed.append(own)
             time.sleep(1e-3)
-        process.send_signal(signal.SIGKILL)
-        killed = time.monotonic()
+        killed = time.monotonic() - _waited_s(process)
+        process.kill()
     lost = pushed[len(read_run(folder).rows) :]
     return killed - lost[0] if lost else 0.0
 
