@@ -91,6 +91,8 @@ class SweepSpec(Section):
     """Seed of all draws, and of the noise of each run."""
     runs: Annotated[int, Field(ge=1, le=RUNS_MAX)] = 1
     """Runs at each point of the grid; each has draws of its own, the same ones at every point."""
+    faults: list[str] = Field(default_factory=list)
+    """Faults that are injected into every run, as behind `dcmp-hil run --fault`."""
     set: dict[str, Scalar] = Field(default_factory=dict)
     """Keys of the rig, in dotted form, that differ from its file in every run."""
     grid: dict[str, GridAxis] = Field(default_factory=dict)
