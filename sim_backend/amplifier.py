@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections import deque
 
+from dcmp_hil.control.elementary import nearest
+
 
 class Amplifier:
     """Clamp, slew limit, dead zone and quantiser, behind a delay of whole periods.
@@ -58,7 +60,7 @@ class Amplifier:
         # The ramp goes on underneath quantiser and dead zone, or a slow one would never leave them.
         self._ramp = output = max(self._ramp - self._slew, min(self._ramp + self._slew, wanted))
         if self._quantum:
-            output = self._quantum * round(output / self._quantum)
+            output = self._quantum * nearest(output / self._quantum)
             if abs(output) > self._limit:
                 output -= math.copysign(self._quantum, output)
         return 0.0 if abs(output) < self._dead_zone else output

@@ -7,6 +7,7 @@ import random
 from typing import TYPE_CHECKING
 
 from dcmp_hil.control.counted_random import ENCODER_NOISE, CountedRandom
+from dcmp_hil.control.elementary import floor
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
@@ -44,10 +45,10 @@ class Encoder:
         self._reads = 0
 
     def read(self, position: float) -> float:
-        """Return the measured position, rad."""
+        """Return the measured position, rad; NaN of a position that is not finite."""
         if self._count is None:
             return position + self._drawn() if self._noise else position
-        return self._count * (self.count(position) - self._phase)
+        return self._count * (self._shown(position / self._count) - self._phase)
 
     def count(self, position: float) -> int:
         """Return the counter at a position (rad), unwrapped; an ideal encoder has none.
@@ -59,16 +60,18 @@ class Encoder:
         """
         if self._count is None:
             raise ValueError("an ideal encoder has no counts")
-        counts = position / self._count + self._phase
-        return math.floor(counts + 0.5) if self._exact else self._inexact(counts)
+        return int(self._shown(position / self._count))
 
-    def _inexact(self, counts: float) -> int:
-        """Return the counter with noise and misplaced edges, at a position in counts."""
+    def _shown(self, counts: float) -> float:
+        """Return the counter at a position in counts, a whole number."""
+        counts += self._phase
+        if self._exact:
+            return floor(counts + 0.5)
         if self._noise:
             counts += self._drawn()
-        count = math.floor(counts + 0.5)
-        if self._edges:
-            lower, upper = (self._edges[edge % len(self._edges)] for edge in (count, count + 1))
+        count = floor(counts + 0.5)
+        if self._edges and math.isfinite(count):
+            lower, upper = (self._edges[int(edge) % len(self._edges)] for edge in (count, count + 1.0))
             count += (counts >= count + 0.5 + upper) - (counts < count - 0.5 + lower)
         return count
 

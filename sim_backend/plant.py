@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Protocol
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.control.elementary import sine
 from dcmp_hil.values import Truth
+from sim_backend.core_plant import CorePlant
 from sim_backend.detailed_plant import DetailedPlant
+from sim_backend.engine import engine_of
 
 if TYPE_CHECKING:
     from dcmp_hil.config import Rig
     from dcmp_hil.control.model import Model
+    from sim_backend.engine import Engine
 
 
 class Plant(Protocol):
@@ -118,11 +121,13 @@ class EulerPlant:
         return -self._plant.f1 * sign + self._plant.external(t) - self._plant.gravity * sine(x1)
 
 
-def make_plant(rig: Rig) -> Plant:
-    """Make the plant that a rig's `[sim]` and `[model]` describe."""
+def make_plant(rig: Rig, engine: Engine | None = None) -> Plant:
+    """Make the plant that a rig's `[sim]` and `[model]` describe; None finds its engine."""
     module, _, name = rig.sim.plant_class.partition(":")
     steps = rig.plant_steps
     place = {"position": rig.sim.position_rad, "step": rig.period / steps}
+    if (engine or engine_of(rig)).core:
+        return CorePlant(rig.plant, rig.model.values(), **place, steps=steps)
     details = rig.sim.details
     if details is not None:
         return DetailedPlant(rig.plant, rig.model.values(), details, **place, steps=steps)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.telemetry.statistics import Summary
+    from sim_backend.encoder import Encoder
     from sim_backend.plant import Plant
 
 T = 1e-3  # s, the bench rig's period
@@ -100,13 +101,27 @@ class PlantSees:
         self._plant.stretch(factor)
 
 
+class SeenByPlant:
+    """Hooks for a plant that gets another voltage than the amplifier reports."""
+
+    def __init__(self, changed: Callable[[float], float]) -> None:
+        self._changed = changed
+
+    def plant(self, plant: Plant) -> Plant:
+        return PlantSees(plant, self._changed)
+
+    @staticmethod
+    def encoder(encoder: Encoder) -> Encoder:
+        return encoder
+
+
 class FaultySim(SimBackend):
     """The simulated rig with a fault from `fault_at(rig)` on, drawn by `sim.seed`."""
 
     earliest, latest = 4.0, 4.0 + 4.0 * math.pi  # s: one period of sin(t/2), after the soft start
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        super().__init__(rig, clock)
+        super().__init__(rig, clock, SeenByPlant(lambda v: v if self._t < self.fault_at else self.seen(v)))
         self.fault_at = self.instant(rig)
         self._t = 0.0
 
@@ -114,6 +129,10 @@ class FaultySim(SimBackend):
     def instant(cls, rig: Rig) -> float:
         """Return when the fault begins, s."""
         return random.Random(rig.sim.seed).uniform(cls.earliest, cls.latest)
+
+    def seen(self, voltage: float) -> float:
+        """Return what the motor gets of a voltage while the fault is on, V."""
+        return voltage
 
     def read(self) -> Sample:
         sample = super().read()
@@ -137,17 +156,15 @@ class StuckEncoder(FaultySim):
 class LostPower(FaultySim):
     """The voltage is reported, and never reaches the motor."""
 
-    def __init__(self, rig: Rig, clock: Clock) -> None:
-        super().__init__(rig, clock)
-        self._plant = PlantSees(self._plant, lambda v: v if self._t < self.fault_at else 0.0)
+    def seen(self, voltage: float) -> float:  # noqa: ARG002
+        return 0.0
 
 
 class Reversed(FaultySim):
     """A plant whose motor turns in the wrong direction."""
 
-    def __init__(self, rig: Rig, clock: Clock) -> None:
-        super().__init__(rig, clock)
-        self._plant = PlantSees(self._plant, lambda v: v if self._t < self.fault_at else -v)
+    def seen(self, voltage: float) -> float:
+        return -voltage
 
 
 class ReversedFromTheStart(Reversed):
@@ -174,14 +191,13 @@ class DelayedPlant(SimBackend):
     periods = 0
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        super().__init__(rig, clock)
         waiting = deque([0.0] * self.periods)
 
         def later(voltage: float) -> float:
             waiting.append(voltage)
             return waiting.popleft()
 
-        self._plant = PlantSees(self._plant, later)
+        super().__init__(rig, clock, SeenByPlant(later))
 
 
 class DemandedVoltage(SimBackend):

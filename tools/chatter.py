@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
     from dcmp_hil.values import Sample, Truth
+    from sim_backend.encoder import Encoder
     from sim_backend.plant import Plant
 
 _WINDOW_BLOCKS = 10  # blocks
@@ -113,10 +114,18 @@ class Case(SimBackend):
     """Counts, by which each edge of the encoder is off, at most."""
 
     def __init__(self, rig: Rig, clock: Clock) -> None:
-        super().__init__(rig, clock)
-        self._plant = _Between(self._plant, self, rig.plant.ku, rig.period)
+        self._ku = rig.plant.ku
+        super().__init__(rig, clock, self)
         self._draw = random.Random(rig.sim.seed)  # noqa: S311 - a simulation must repeat itself
         self._edges = [self._draw.uniform(-self.misplaced, self.misplaced) for _ in range(4096)]
+
+    def plant(self, plant: Plant) -> Plant:
+        """Return the plant as the case has it."""
+        return _Between(plant, self, self._ku, self._period)
+
+    def encoder(self, encoder: Encoder) -> Encoder:
+        """Return the encoder as it is."""
+        return encoder
 
     def read(self) -> Sample:
         """Return the next sample that is not lost, its count found at edges that are off."""

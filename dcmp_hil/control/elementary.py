@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 
 _ROUNDING = 6755399441055744.0  # 1.5 * 2**52: a sum with it has no bits left for a fraction
+_WHOLE = 2251799813685248.0  # 2**51: from here on the sum with it is not exact
 
 _SINE_MAX_RAD = 1073741824.0  # 2**30: one bit of it is 1e-7 rad
 _ONE_OVER_PI = 0.3183098861837907
@@ -36,6 +37,19 @@ _ROOT_HALF = 0.7071067811865476
 
 _C0, _C1, _C2, _C3 = 1.2370205743741491, -0.29720836448046895, 0.04589482882193578, -0.0025489133602668228
 _THIRD, _TWO_NINTHS, _FOURTEEN_81ST = 1 / 3, 2 / 9, 14 / 81  # series of (1 - h)**(-1/3)
+
+
+def nearest(x: float) -> float:
+    """Return the nearest whole number, half to even; x itself from 2**51 on, and NaN of NaN."""
+    return (x + _ROUNDING) - _ROUNDING if -_WHOLE < x < _WHOLE else x
+
+
+def floor(x: float) -> float:
+    """Return the largest whole number that is not above x; x itself from 2**51 on, and NaN of NaN."""
+    if not -_WHOLE < x < _WHOLE:
+        return x
+    n = (x + _ROUNDING) - _ROUNDING
+    return n - 1.0 if n > x else n
 
 
 def sine(x: float) -> float:
