@@ -115,7 +115,8 @@ class FrictionKalman:
         self._f_max = _FRICTION_MAX_RATIO * model.f1
         self._f1_variance = f1_uncertainty * f1_uncertainty
         self._restart_after = (GAP_PERIODS_MAX + STEP_TOLERANCE_PERIODS) * context.period
-        self._unchanged_variance = (_UNCHANGED_COUNTS * self._q) ** 2
+        unchanged = _UNCHANGED_COUNTS * self._q
+        self._unchanged_variance = unchanged * unchanged
         self.retune(FrictionKalmanTuning(d_noise, edge_counts))
         self._t = self._y = self._first = self._edge_t = math.nan
         self._count = self.steps = 0
@@ -134,7 +135,8 @@ class FrictionKalman:
     def retune(self, tuning: FrictionKalmanTuning) -> None:
         """Change the noises; the state stays."""
         self._d_noise = tuning.d_noise
-        self._edge_variance = (tuning.edge_counts * self._q) ** 2
+        edge = tuning.edge_counts * self._q
+        self._edge_variance = edge * edge
 
     def update(self, sample: Sample) -> Estimate:
         """Advance to `sample.t` over the voltage really applied, and correct by its count.
@@ -192,7 +194,7 @@ class FrictionKalman:
             q * q / 12.0, 0.0, 0.0, 0.0, 0.0,
             _VELOCITY_VARIANCE, 0.0, 0.0, 0.0,
             _DISTURBANCE_VARIANCE, 0.0, 0.0,
-            self._f1_variance, 0.0, _SLOPE_DEVIATION**2,
+            self._f1_variance, 0.0, _SLOPE_DEVIATION * _SLOPE_DEVIATION,
         )
         # fmt: on
         self.trust, self.sticks, self.steps = BELIEVED, False, 0
@@ -217,7 +219,8 @@ class FrictionKalman:
         span = q / speed if speed * step > q else step
         passed = self._y - (self._half_count if rise > 0 else -self._half_count)
         e, h = passed - x1 + 0.5 * span * x2, -0.5 * span
-        r = self.trust[5] * self._edge_variance + (x2 * span) ** 2 / 12.0
+        travel = x2 * span
+        r = self.trust[5] * self._edge_variance + travel * travel / 12.0
         since, self._edge_t = self._t - self._edge_t, self._t
         if self.sticks and e * e > _RELEASE_GATE * (p[0] + r):
             self.sticks = False
@@ -272,4 +275,6 @@ def _explained(p: Covariance, e: float, h: float, variance: float) -> Covariance
     """Return P so wide that a step of the disturbance, a while ago, explains the innovation `e`."""
     half = 0.5 * _STEP_AGE_S * _STEP_AGE_S
     seen = max(half + h * _STEP_AGE_S, 0.5 * half)
-    return widened(p, _STEP_AGE_S, min((e * e - variance) / (seen * seen), _STEP_DEVIATION_MAX**2))
+    return widened(
+        p, _STEP_AGE_S, min((e * e - variance) / (seen * seen), _STEP_DEVIATION_MAX * _STEP_DEVIATION_MAX)
+    )
