@@ -10,7 +10,7 @@ from dcmp_hil.config.toml_text import parse_value
 from dcmp_hil.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 _SHOWN_CHARS_MAX = 60  # characters of an override that are shown
 _OVERRIDES_MAX = 200
@@ -39,14 +39,25 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> set[str]
         With every override that is no `key=value`, is too long, or reaches into a value.
     """
     pairs, faults = _parsed(overrides)
+    return apply_values(table, pairs, faults)
+
+
+def apply_values(
+    table: dict[str, Any], pairs: Mapping[tuple[str, ...], Any], faults: Sequence[str] = ()
+) -> set[str]:
+    """Apply values of keys, as parts, to the table of a rig; see `apply_overrides`.
+
+    `faults` are raised with those that are found here.
+    """
+    found = list(faults)
     for (name, *rest), kind in pairs.items():
         if rest == ["kind"]:
             _drop_keys_of_old_kind(table, name, kind)
     made: set[str] = set()
     for parts, value in pairs.items():
-        faults += _put(table, parts, value, made)
-    if faults:
-        raise ConfigError(*faults)
+        found += _put(table, parts, value, made)
+    if found:
+        raise ConfigError(*found)
     return made
 
 

@@ -71,7 +71,7 @@ class BlockWork:
     def rows(self, runs: Sequence[int], duration_s: float) -> list[RunRow]:
         """Return a row for each of some runs, each of them `duration_s` (s) long."""
         design, engines = SweepDesign(self.spec), self.engines()
-        rigs = variants(self.base, (design.overrides(run) for run in runs))
+        rigs = variants(self.base, (design.named(run) for run in runs))
         groups: dict[str, list[int]] = defaultdict(list)
         found = [RunRow(run, design.values(run), "", "", NO_OUTCOME) for run in runs]
         for place, rig in enumerate(rigs):

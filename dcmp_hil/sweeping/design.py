@@ -54,7 +54,11 @@ class SweepDesign:
 
     def overrides(self, run: int) -> list[str]:
         """Return the keys and values of a run as behind `--set`."""
-        return [override(key, value) for key, value in zip(self.keys, self.values(run), strict=True)]
+        return [override(key, value) for key, value in self.named(run).items()]
+
+    def named(self, run: int) -> dict[str, Scalar]:
+        """Return the keys of a run with their values."""
+        return dict(zip(self.keys, self.values(run), strict=True))
 
 
 def override(key: str, value: Scalar) -> str:

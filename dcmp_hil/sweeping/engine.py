@@ -53,6 +53,10 @@ class RunOutcome(NamedTuple):
     """`TripError.reason`, such as "speed"."""
 
 
+FIGURES = RunOutcome._fields[: RunOutcome._fields.index("tripped")]
+"""Names of the figures of a run, which are those of `dcmp_hil.Summary`."""
+
+
 class SweepEngine(Protocol):
     """Runs rigs in virtual time; an instance is used by one thread at a time."""
 

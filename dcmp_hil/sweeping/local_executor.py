@@ -143,8 +143,8 @@ def _again(worker: _Worker) -> int:
     if worker.trial >= _TRIALS:
         first, last = worker.block.first, worker.block.first + worker.block.runs - 1
         raise BackendError(
-            f"The process of runs {first} to {last} of the sweep {ended}, {_TRIALS} times. What is finished is "
-            "kept. Look for a lack of memory, or run one of them alone; the same command continues."
+            f"The process of runs {first} to {last} of the sweep {ended}, {_TRIALS} times. What is "
+            "finished is kept, and the same command continues. Look for a lack of memory, or run one alone."
         )
     return worker.trial + 1
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from dcmp_hil.errors import BackendError, DcmpError, DeadlineError, TripError
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.session import Session
-from dcmp_hil.sweeping.engine import RunOutcome
+from dcmp_hil.sweeping.engine import FIGURES, RunOutcome
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,21 +53,21 @@ class PlainLoop:
             session.run()
         except (TripError, DeadlineError, BackendError) as error:
             tripped, time, cause = True, _time_of(error, session), getattr(error, "reason", FAILED)
-        return RunOutcome(
-            **_figures(session.result().summary), tripped=tripped, trip_time_s=time, trip_cause=cause
-        )
+        figures = _figures(session.result().summary)
+        return RunOutcome(*figures, tripped, time, cause)
 
 
 class _Unstopped(StopRequest):
-    """A request that no signal makes: Ctrl-C ends the sweep, and leaves no run that is shorter than others."""
+    """A request that no signal makes: Ctrl-C ends the sweep, and no run of it is shorter."""
 
     def __enter__(self) -> Self:
+        """Leave the signals alone."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        return None
+        """Leave the signals alone."""
 
 
 def _time_of(error: DcmpError, session: Session) -> float:
@@ -76,8 +76,7 @@ def _time_of(error: DcmpError, session: Session) -> float:
     return float(cycles[-1].sample.t) if cycles else session.result().summary.window_s[1]
 
 
-def _figures(summary: Summary) -> dict[str, float]:
-    """Return the figures of a run by their names in `RunOutcome`."""
-    names = RunOutcome._fields[: RunOutcome._fields.index("tripped")]
-    found = {name: getattr(summary, name) for name in names}
-    return {name: math.nan if value is None else value for name, value in found.items()}
+def _figures(summary: Summary) -> list[Any]:
+    """Return the figures of a run in the order of `RunOutcome`."""
+    values = (getattr(summary, name) for name in FIGURES)
+    return [math.nan if value is None else value for value in values]
