@@ -46,7 +46,7 @@ class SimBackend:
         self._period = rig.period
         self._skips = rig.timing.overrun == "skip"
         engine = engine_of(rig)
-        self.remarks = (engine.remark,) if engine.remark else ()
+        self.remarks = engine.remarks
         self._hardware = make_hardware(rig, engine, faults)
         self._live = False
 

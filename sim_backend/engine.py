@@ -14,7 +14,7 @@ _PLANT_OF_THE_CORE = "sim_backend.plant:MoreauPlant"
 
 
 class Engine(NamedTuple):
-    """What computes a rig's plant.
+    """Choice for one rig.
 
     Parameters
     ----------
@@ -26,6 +26,11 @@ class Engine(NamedTuple):
 
     core: bool
     remark: str = ""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The remark as remarks of a backend."""
+        return (self.remark,) if self.remark else ()
 
 
 def is_for_core(rig: Rig) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from dcmp_hil.config.backends import SimBoard
 from dcmp_hil.device.backend import DeviceBackend
@@ -52,6 +52,12 @@ class SimBoardBackend(DeviceBackend):
         carrier, pacer = rig.backend.carrier, Pacer(clock, rig.period)
         self.board = board or Board(rig, carrier=carrier)
         super().__init__(rig, (link or BoardLink)(self.board, carrier, pacer), clock)
+
+    def __enter__(self) -> Self:
+        """Open the device, disarmed."""
+        super().__enter__()
+        self.remarks += self.board.pins.remarks
+        return self
 
     def truth(self) -> Truth:
         """Return the true state at the last sample."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dcmp_hil.values import Truth
 from sim_backend.amplifier import Amplifier
 from sim_backend.encoder import make_encoder
+from sim_backend.engine import engine_of
 from sim_backend.plant import make_plant
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ class PlantIO:
     """
 
     def __init__(self, rig: Rig, count_offset: int = 0) -> None:
-        self._plant = make_plant(rig)
+        engine = engine_of(rig)
+        self.remarks = engine.remarks
+        self._plant = make_plant(rig, engine)
         self._encoder = make_encoder(rig)
         self._healthy = self._plant, self._encoder
         self._stage = _power_stage(rig)

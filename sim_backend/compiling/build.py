@@ -29,7 +29,7 @@ SHARED = ("-shared", "-fPIC", "-fvisibility=hidden")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What is compiled, of the files under `firmware`.
+    """A file to be made of sources under `firmware`.
 
     Parameters
     ----------

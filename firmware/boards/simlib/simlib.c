@@ -81,6 +81,7 @@ void simlib_advance(struct simlib *sim)
         dcmp_sim_amplifier_step(amplifier->state, amplifier->model, dcmp_sim_command(amplifier->newest));
     sim->voltage = amplifier->state.output;
     simlib_plant(sim);
+    sim->tick++;
 }
 
 /* What the encoder shows now. */
@@ -108,10 +109,8 @@ void simlib_sample(struct simlib *sim)
 {
     if (sim->samples > 0) {
         simlib_advance(sim);
-        sim->tick++;
         for (int32_t lost = 0; lost < LOST_MAX && is_lost(sim); lost++) {
             simlib_advance(sim);
-            sim->tick++;
         }
     }
     sim->samples++;
