@@ -44,6 +44,11 @@ class SimulatedClock:
         self._now_ns = max(self._now_ns, deadline_ns)
 
 
+def cpu_ns() -> int:
+    """Return the time for which this process has computed, ns; only differences mean anything."""
+    return time.process_time_ns()
+
+
 def pause(seconds: float) -> None:
     """Sleep for `seconds`: for helpers beside the loop, never inside it."""
     time.sleep(seconds)

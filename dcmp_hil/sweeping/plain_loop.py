@@ -54,7 +54,7 @@ class PlainLoop:
         except (TripError, DeadlineError, BackendError) as error:
             tripped, time, cause = True, _time_of(error, session), getattr(error, "reason", FAILED)
         figures = _figures(session.result().summary)
-        return RunOutcome(*figures, tripped, time, cause)
+        return RunOutcome._make((*figures, tripped, time, cause))
 
 
 class _Unstopped(StopRequest):
