@@ -21,8 +21,8 @@ typedef uint32_t dcmp_word;
 #define DCMP_EXPONENT_BIAS ((dcmp_word)127)
 #define DCMP_ROUNDING REAL(0x1.8p23)   /* a sum with it has no bits left for a fraction */
 #define DCMP_WHOLE REAL(0x1p22)        /* from here on the sum with it is not exact */
-#define DCMP_SINE_MAX REAL(65536.0)    /* rad */
-#define DCMP_PI_1 REAL(3.141357421875) /* pi in parts: 13 and 13 bits, and the rest */
+#define DCMP_SINE_MAX REAL(65536.0)    /* rad; beyond 3216 rad the sine is that of x within half a bit of it */
+#define DCMP_PI_1 REAL(3.141357421875) /* pi in parts: 14 bits, and the rest */
 #define DCMP_PI_2 REAL(0.0002352297306060791)
 #define DCMP_PI_3 REAL(1.984187159361081e-09)
 #define DCMP_EXPONENT_MAX REAL(87.0)

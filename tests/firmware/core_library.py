@@ -74,6 +74,13 @@ def law_headers() -> dict[Path, Path]:
     return {header: check for header, check in found if check.exists() and check.stem != "core_checks"}
 
 
+def law_checks(header: Path) -> list[Path]:
+    """Return the files of the tests that use all of a header; one type is enough for code."""
+    if header.stem == "dcmp_real":
+        return [HERE / "elementary_checks.c", HERE / "elementary_float_checks.c"]
+    return [law_headers()[header]]
+
+
 def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
     """Compile the core and more files, each into an object of its own."""
     objects = []

@@ -2,6 +2,8 @@
 #include "law_checks.h"
 
 #define OUT_NUMBERS 34u
+#define EDGE_NUMBERS 33u
+#define EDGE_OUT_NUMBERS 28u /* without estimate and prediction */
 
 void CHECK(moved)(const double *rows, double *out, uint32_t n)
 {
@@ -46,12 +48,42 @@ static void put(double *out, const struct dcmp_friction_kalman *filter, struct d
     }
 }
 
+static struct dcmp_friction_setup setup_of(const double *x)
+{
+    const struct dcmp_friction_setup setup = {(real)x[0], (real)x[1], (real)x[2], (real)x[3], (real)x[4],  (real)x[5],
+                                              (real)x[6], (real)x[7], (real)x[8], (real)x[9], (real)x[10], (real)x[11]};
+    return setup;
+}
+
+void CHECK(by_edge)(const double *setup, const double *rows, double *out, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const double *x = &rows[EDGE_NUMBERS * i];
+        const double *p = &x[5];
+        const double *trust = &x[20];
+        double every[OUT_NUMBERS];
+        struct dcmp_friction_kalman filter = {
+            .state = {(real)x[0], (real)x[1], (real)x[2], (real)x[3], (real)x[4], (real)x[26], (real)0},
+            .covariance = {(real)p[0], (real)p[1], (real)p[2], (real)p[3], (real)p[4], (real)p[5], (real)p[6], (real)p[7],
+                           (real)p[8], (real)p[9], (real)p[10], (real)p[11], (real)p[12], (real)p[13], (real)p[14]},
+            .trust = {(real)trust[0], (real)trust[1], (real)trust[2], (real)trust[3], (real)trust[4], (real)trust[5]},
+            .sticks = x[27] > 0.0,
+            .t = (real)x[28],
+            .edge_t = (real)x[29],
+            .y = (real)x[30],
+        };
+        filter = dcmp_by_edge(filter, setup_of(setup), (real)x[31], (real)x[32]);
+        put(every, &filter, filter.estimate);
+        for (uint32_t k = 0; k < EDGE_OUT_NUMBERS; k++) {
+            out[EDGE_OUT_NUMBERS * i + k] = every[k + 3u];
+        }
+    }
+}
+
 void CHECK(friction_kalman)(const double *setup, double period, uint32_t delay, const double *rows, double *out,
                             uint32_t n)
 {
-    const struct dcmp_friction_setup by = {(real)setup[0], (real)setup[1], (real)setup[2],  (real)setup[3],
-                                           (real)setup[4], (real)setup[5], (real)setup[6],  (real)setup[7],
-                                           (real)setup[8], (real)setup[9], (real)setup[10], (real)setup[11]};
+    const struct dcmp_friction_setup by = setup_of(setup);
     struct dcmp_friction_kalman filter = dcmp_friction_begin(by, (real)rows[0], (real)rows[1]);
     for (uint32_t i = 0; i < n; i++) {
         const double *row = &rows[5u * i];

@@ -36,6 +36,9 @@ void CHECK(known_friction)(double f1, double volts, const double *rows, double *
 /* dcmp_friction_kalman.h */
 void CHECK(moved)(const double *rows, double *out, uint32_t n);  /* x1 x2 d f s step u f0 gravity */
 void CHECK(judged)(const double *rows, double *out, uint32_t n); /* the trust, nu, step, edge */
+/* x1 x2 d f s, the covariance, the trust, a, sticks, t, of the last edge, y, rise, step; out come state, covariance, trust,
+ * sticks and steps. */
+void CHECK(by_edge)(const double *setup, const double *rows, double *out, uint32_t n);
 /* Rows of t, y, voltage, voltage under way, velocity of the reference; of each come out the estimate, the state, the
  * covariance, the trust, sticks, steps, and the state ahead after `delay` periods. */
 void CHECK(friction_kalman)(const double *setup, double period, uint32_t delay, const double *rows, double *out,

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.firmware.core_library import HERE, PREBUILT, ROOT, app_sources, build, compiler, sources
+from tests.firmware.core_library import (
+    HERE,
+    PREBUILT,
+    ROOT,
+    app_sources,
+    build,
+    compiler,
+    law_headers,
+    sources,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,11 +74,12 @@ def test_sanitizers(tmp_path: Path) -> None:
 
 
 def _counted(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return gcov's figures of every file of the core."""
+    """Return gcov's figures of every file of the core; of the law's headers in double precision."""
     gcov = shutil.which("gcov")
     assert gcov is not None, "gcov belongs to gcc: apt install gcc"
     files = {}
-    for source in [*sources(), *app_sources()]:
+    compiled = {source: source for source in [*sources(), *app_sources()]} | law_headers()
+    for counted, source in compiled.items():
         command = [
             gcov,
             "--branch-probabilities",
@@ -79,7 +89,7 @@ def _counted(folder: Path) -> dict[str, dict[str, Any]]:
         ]
         read = subprocess.run(command, capture_output=True, text=True, check=True, cwd=folder)
         for report in read.stdout.splitlines():
-            files.update({f["file"]: f for f in json.loads(report)["files"] if f["file"] == str(source)})
+            files.update({f["file"]: f for f in json.loads(report)["files"] if f["file"] == str(counted)})
     return files
 
 
@@ -88,7 +98,7 @@ def test_every_line_and_branch(tmp_path: Path) -> None:
     files = _counted(tmp_path)
     missing = []
     print(f"\n{'file':24}{'lines':>12}{'branches':>12}")  # noqa: T201
-    for source in [*sources(), *app_sources()]:
+    for source in [*sources(), *app_sources(), *law_headers()]:
         lines = files[str(source)]["lines"]
         branches = [(line["line_number"], branch["count"]) for line in lines for branch in line["branches"]]
         dead = {line["line_number"] for line in lines if not line["count"]}

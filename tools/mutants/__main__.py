@@ -20,6 +20,7 @@ _CORE = ("watchdog", "supervisor", "guard", "amplifier", "session", "health", "d
 _APP = ("life", "app", "record", "boot_count", "fault_log", "ring")
 FILES = [CORE / f"dcmp_{name}.c" for name in (*_CORE, "history", "parameters")]
 FILES += [APP / f"{name}.c" for name in _APP]
+FILES += [CORE / f"dcmp_{name}.h" for name in ("real", "elementary", "control", "friction_kalman")]
 NAMES = HERE / "mutants.toml"
 
 

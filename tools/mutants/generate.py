@@ -21,7 +21,8 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "&&": ("||",), "||": ("&&",),
     "+=": ("-=", "="), "-=": ("+=", "="), "++": ("--",), "--": ("++",),
 }  # fmt: skip
-_NUMBER = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)\b")
+_FRACTION = r"0[xX][0-9a-fA-F.]+p[+-]?\d+|\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+"
+_NUMBER = re.compile(rf"(?<![\w.])(?:({_FRACTION})|(0[xX][0-9a-fA-F]+|\d+)([uUlL]*))(?![\w.])")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
@@ -117,15 +118,28 @@ def _condition(node: Node) -> Iterator[Change]:
 
 
 def _numbers(node: Node) -> Iterator[Change]:
-    """Put one more for a number, and 0 for 1."""
+    """Put other numbers for each number."""
     remarks_blank = _COMMENT.sub(lambda remark: " " * len(remark[0]), text_of(node))
     for found in _NUMBER.finditer(remarks_blank):
-        digits, suffix = found.groups()
-        value = int(digits, 0)
-        more = f"{value + 1:#x}" if digits[:2] in ("0x", "0X") else str(value + 1)
-        for other in [more, "0"] if value == 1 else [more]:
-            start, end = node.start_byte + found.start(), node.start_byte + found.end()
-            yield Change(start, end, other + suffix)
+        fraction, digits, suffix = found.groups()
+        start, end = node.start_byte + found.start(), node.start_byte + found.end()
+        others = _other_fractions(fraction) if fraction else _other_wholes(digits, suffix)
+        yield from (Change(start, end, other) for other in others)
+
+
+def _other_wholes(digits: str, suffix: str) -> list[str]:
+    """Return one more, and 0 for 1."""
+    value = int(digits, 0)
+    more = f"{value + 1:#x}" if digits[:2] in ("0x", "0X") else str(value + 1)
+    return [other + suffix for other in ([more, "0"] if value == 1 else [more])]
+
+
+def _other_fractions(text: str) -> list[str]:
+    """Return 1 for 0, 0 and 2 for 1, of other numbers with a fraction one part in 1000 more."""
+    value = float.fromhex(text) if text[:2] in ("0x", "0X") else float(text)
+    if value == 0.0:
+        return ["1.0"]
+    return ["0.0", "2.0"] if value == 1.0 else [repr(1.001 * value)]
 
 
 def _truth(node: Node) -> Iterator[Change]:
@@ -163,10 +177,24 @@ CHANGES: dict[str, tuple[Callable[[Node], Iterator[Change]], ...]] = {
 """What may be done to a piece of the source, by its kind."""
 
 
+_AROUND = ("translation_unit", "preproc_ifdef", "preproc_if", "preproc_else", "preproc_elif")
+"""Of these, what is inside has the name."""
+
+
+def _of_the_compiler(node: Node) -> bool:
+    """Return whether a piece is a condition or an error of the preprocessor."""
+    parent = node.parent
+    return parent is not None and (
+        parent.type == "preproc_call"
+        or (parent.type in _AROUND and parent.child_by_field_name("condition") == node)
+        or _of_the_compiler(parent)
+    )
+
+
 def _place(node: Node) -> str:
     """Return the name of the outermost thing that a piece of the source stands in."""
     outer, name = node, None
-    while outer.parent is not None and outer.parent.parent is not None:
+    while outer.parent is not None and outer.parent.type not in _AROUND:
         outer = outer.parent
     name = outer.child_by_field_name("declarator") or outer.child_by_field_name("name")
     while name is not None and name.type != "identifier":
@@ -184,6 +212,8 @@ def mutants(path: Path) -> list[Mutant]:
     tree = Parser(Language(tree_sitter_c.language())).parse(source)
     found: dict[Change, str] = {}
     for node in walk(tree.root_node):
+        if _of_the_compiler(node):
+            continue
         for change in (made for make in CHANGES.get(node.type, ()) for made in make(node)):
             if source[change.start : change.end] != change.text.encode():
                 found.setdefault(change, _place(node))

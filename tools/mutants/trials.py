@@ -25,7 +25,8 @@ _STATE = (
     *("memory", "sessions", "supervisor", "watchdog"),
 )
 _AROUND = ("app", "boot_count", "latched", "parameters", "records", "reports", "rings")
-TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND)
+_LAW = ("elementary", "control", "friction_kalman")
+TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND + _LAW)
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
 SINGLE = {"OPENBLAS_NUM_THREADS": "1"}

@@ -79,8 +79,43 @@ def test_of_0_a_negative_argument_and_no_number(core: Core) -> None:
     assert np.isnan(law("expm1", np.array([math.nan]))).all()
 
 
-def test_single_precision_is_as_good_as_its_bits(core: Core) -> None:
+EPSILON = 2.0**-23
+SINGLE: dict[
+    str, tuple[Callable[[Array], Array], Array, float, float]
+] = {  # largest error: relative, absolute
+    "sine": (np.sin, np.linspace(-3200.0, 3200.0, 20001), 0.0, 1.3e-7),
+    "sine, far": (np.sin, np.linspace(6e4, 65535.0, 5001), 0.0, 2.0**-9),
+    "cosine": (np.cos, np.linspace(-3.0, 3.0, 5001), 0.0, 4e-7),  # the quarter of a turn is added in float
+    "expm1": (np.expm1, np.linspace(-87.0, 87.0, 20001), 2 * EPSILON, 0.0),
+    "expm1, small": (np.expm1, 10.0 ** np.linspace(-30.0, 0.0, 5001), 2 * EPSILON, 0.0),
+    "exponential": (np.exp, np.linspace(-87.0, 87.0, 20001), 2 * EPSILON, 0.0),
+    "logarithm": (np.log, 10.0 ** np.linspace(-37.0, 38.0, 20001), 2 * EPSILON, EPSILON / 8),
+    "inverse_cube_root": (lambda x: x ** (-1 / 3), 10.0 ** np.linspace(-37.0, 38.0, 20001), 3 * EPSILON, 0.0),
+    "square_root": (np.sqrt, 10.0 ** np.linspace(-37.0, 38.0, 5001), EPSILON / 2, 0.0),
+    "nearest": (np.round, np.linspace(-99.0, 99.0, 1981), 0.0, 0.0),
+    "floor": (
+        np.floor,
+        np.append(np.linspace(-99.0, 99.0, 1981), [2.0**22 - 0.5, 2.0**22 + 1.0, 1e30]),
+        0.0,
+        0.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_single_precision_is_as_good_as_its_bits(core: Core, name: str) -> None:
+    function, given, relative, absolute = SINGLE[name]
+    x = given.astype(np.float32).astype(float)
+    wanted = function(x)
+    apart = np.abs(Law(core, "float_")(name.partition(",")[0], x) - wanted) - relative * np.abs(wanted)
+    assert apart.max() <= absolute
+
+
+def test_single_precision_at_its_limits(core: Core) -> None:
     law = Law(core, "float_")
-    x = np.float32(np.linspace(-300.0, 300.0, 20001)).astype(float)
-    assert np.abs(law("sine", x) - np.sin(x)).max() < 1.3e-7
-    assert np.abs(law("cosine", x) - np.cos(x)).max() < 1.6e-5  # the quarter of a turn is added in float
+    assert law("sine", np.array([65536.0, -65536.0, 1e30])).tolist() == [0.0, 0.0, 0.0]
+    assert law("sine", np.array([65535.0]))[0] != 0.0
+    ends = law("exponential", np.array([87.0, 87.01, 1e30, -87.0, -87.01, -1e30, math.nan]))
+    assert ends[0] == ends[1] == ends[2]
+    assert ends[3] == ends[4] == ends[5] > 0.0
+    assert math.isnan(ends[6])

@@ -150,7 +150,10 @@ def _motions() -> Array:
     ends = [(0.0, sign * 1.0, 0.0, 3.0, 0.0, 0.5, 0.0, 0.0, 0.0) for sign in (1.0, -1.0)]  # 1/3 s to rest
     turns = [(0.0, sign, -sign * 6.0, 3.0, 0.0, 0.5, 0.0, 0.0, 0.0) for sign in (1.0, -1.0)]
     still = [(0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0)]  # the velocity is 0 exactly at the end
-    return np.concatenate([rows, np.array(edges + ends + turns + still)])
+    least = [
+        (0.0, 0.0, sign * 5e-324, 0.0, 0.0, T, 0.0, 0.0, 0.0) for sign in (1.0, -1.0)
+    ]  # no velocity of it
+    return np.concatenate([rows, np.array(edges + ends + turns + still + least)])
 
 
 def test_a_step_of_the_arm_has_the_bits_of_python(core: Core) -> None:
@@ -160,6 +163,48 @@ def test_a_step_of_the_arm_has_the_bits_of_python(core: Core) -> None:
     moving = rows[:, 1] != 0.0
     assert (wanted[moving, 5] == 0.0).any()
     assert (np.sign(rows[moving, 1]) * wanted[moving, 5] < 0.0).any()
+
+
+def _edges() -> Array:
+    """Return arguments of an edge: of an arm that moves, or that stuck, with any covariance and trust."""
+    draw = np.random.default_rng(9)
+    n = 4000
+    spread = 10.0 ** draw.uniform(-4.0, 0.0, (n, 5))
+    like = draw.uniform(-0.3, 0.3, (n, 5, 5))
+    covariance = spread[:, :, None] * spread[:, None, :] * np.where(np.eye(5) > 0.0, 1.0, like)
+    upper = covariance[:, *np.triu_indices(5)]
+    state = draw.uniform(-1.0, 1.0, (n, 5)) * (0.2, 0.3, 3.0, 2.0, 30.0) + (0.0, 0.0, 0.0, 2.0, 0.0)
+    trust = draw.uniform(-1.0, 1.0, (n, 6)) * (9.0, 0.0, 3.0, 1.0, 3.0, 10.0) + (
+        10.0,
+        1.0,
+        3.0,
+        0.0,
+        0.0,
+        11.0,
+    )
+    t, step = draw.uniform(0.1, 1.0, n), draw.uniform(0.1, 30.0, n) * T
+    since = step * draw.uniform(0.5, 4.0, n)
+    rest = [draw.uniform(-3.0, 3.0, n), draw.integers(0, 2, n), t, t - since, draw.uniform(-0.3, 0.3, n)]
+    return np.column_stack([state, upper, trust, *rest, draw.choice([-2.0, -1.0, 1.0, 2.0], n), step])
+
+
+def _by_edge_in_python(observer: FrictionKalman, row: list[float]) -> tuple[float, ...]:
+    a, sticks, t, edge_t, y, rise, step = row[26:]
+    vars(observer).update(trust=(*row[20:26],), sticks=sticks > 0.0, steps=0, _t=t, _edge_t=edge_t, _y=y)
+    by_edge = vars(FrictionKalman)["_by_edge"]
+    state = by_edge(observer, (*row[:5],), (*row[5:20],), a, int(rise), step)
+    return (*state, *observer.covariance, *observer.trust, float(observer.sticks), float(observer.steps))
+
+
+@pytest.mark.parametrize("counts", [4096.0, 64.0])
+def test_an_edge_has_the_bits_of_python(core: Core, counts: float) -> None:
+    rows = _edges()
+    observer, _ = _made(Settings(counts=counts))
+    setup = np.array([vars(observer)[name] for name in SETUP])
+    wanted = np.array([_by_edge_in_python(observer, row) for row in rows.tolist()])
+    assert same_bits(Law(core)("by_edge", setup, rows, width=28), wanted)
+    assert (wanted[:, 27] > 0.0).sum() > 100  # steps
+    assert ((rows[:, 27] > 0.0) & (wanted[:, 26] == 0.0)).sum() > 100  # released
 
 
 def _trusts() -> Array:
