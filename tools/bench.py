@@ -20,6 +20,7 @@ from dcmp_hil.control.observers.paper import PaperObserver
 from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Cycle, Sample
+from tools.bench_core import core_ratios
 from tools.bench_lateness import Lateness, lateness, period_us
 from tools.bench_observers import RATIO_MAX, observer_costs
 from tools.bench_telemetry import Endurance, endurance, record_us
@@ -139,6 +140,7 @@ def _rows() -> list[Row]:
             lambda: _odd_step_us(setting),
         ),
         _row("paper (R0), one step", "us", "", lambda: _step_us(lambda: PaperObserver(setting))),
+        *_core_rows(),
         *_observer_rows(),
         _row(
             "sim-board: the same loop with wire and firmware, 200 us",
@@ -152,6 +154,15 @@ def _rows() -> list[Row]:
         *_wire_rows(),
         _row("dcmp-hil --help", "s", "<= 0.4", lambda: _command_s("-m", "dcmp_hil", "--help")),
         _row("python -c pass, the floor of that", "s", "", lambda: _command_s("-c", "pass")),
+    ]
+
+
+def _core_rows() -> list[Row]:
+    """Compare a run on the core with the same run on the Python plant, taken in turn."""
+    found = [core_ratios(step_us) for step_us in (200.0, 20.0)]
+    return [
+        _row_of(f"run(), the Python plant to the core, {one.step_us:g} us", one.ratios, "x", one.goal)
+        for one in found
     ]
 
 
