@@ -43,3 +43,13 @@ void CHECK(by_edge)(const double *setup, const double *rows, double *out, uint32
  * covariance, the trust, sticks, steps, and the state ahead after `delay` periods. */
 void CHECK(friction_kalman)(const double *setup, double period, uint32_t delay, const double *rows, double *out,
                             uint32_t n);
+
+/* dcmp_random.h */
+void CHECK(philox)(const double *rows, double *out, uint32_t n); /* four words of the block, two of the key */
+void CHECK(random)(uint64_t seed, uint32_t stream, const double *counters, double *out, uint32_t n); /* uniform, normal */
+
+/* dcmp_plant.h */
+/* The model, belief f0 and ku, h, the position at the start; position, velocity and disturbance come out. */
+void CHECK(plant)(const double *setup, uint32_t steps, const double *voltages, double *out, uint32_t n);
+void CHECK(encoder)(const double *setup, const double *rows, double *out, uint32_t n); /* position, normal */
+void CHECK(amplifier)(const double *setup, const double *commands, double *out, uint32_t n);
