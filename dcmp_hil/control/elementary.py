@@ -16,6 +16,7 @@ _WHOLE = 2251799813685248.0  # 2**51: from here on the sum with it is not exact
 _SINE_MAX_RAD = 1073741824.0  # 2**30: one bit of it is 1e-7 rad
 _ONE_OVER_PI = 0.3183098861837907
 _PI_1, _PI_2, _PI_3 = 3.1415926534682512, 1.2154201012607932e-10, 4.044532497591901e-21  # 32, 32 and 53 bits
+_NO_TURN_RAD = 1.57  # within half of pi, also after the product with 1/pi is rounded
 _HALF_PI = 1.5707963267948966
 _S0, _S1, _S2, _S3 = -0.16666666666666666, 0.00833333333333321, -0.00019841269841214512, 2.755731921199205e-06
 _S4, _S5, _S6, _S7 = (
@@ -23,6 +24,7 @@ _S4, _S5, _S6, _S7 = (
 )  # fmt: skip
 
 _EXPONENT_MAX = 700.0
+_NO_SCALE = 0.34  # within half of ln 2
 _ONE_OVER_LN2 = 1.4426950408889634
 _LN2_1, _LN2_2 = 0.6931471805592082, 7.371002565167799e-13  # 40 and 53 bits
 _E0, _E1, _E2, _E3 = 0.5, 0.16666666666666677, 0.0416666666666667, 0.008333333333321633
@@ -36,6 +38,7 @@ _L5, _L6, _L7 = 0.1818357216161805, 0.15313837699209373, 0.14798198605116586
 _ROOT_HALF = 0.7071067811865476
 
 _C0, _C1, _C2, _C3 = 1.2370205743741491, -0.29720836448046895, 0.04589482882193578, -0.0025489133602668228
+_DOUBLES = 2.0, 4.0, 8.0
 _THIRD, _TWO_NINTHS, _FOURTEEN_81ST = 1 / 3, 2 / 9, 14 / 81  # series of (1 - h)**(-1/3)
 
 
@@ -57,6 +60,10 @@ def sine(x: float) -> float:
 
     0 beyond 2**30 rad, where one bit of x is 1e-7 rad; NaN for an argument that is not finite.
     """
+    if -_NO_TURN_RAD <= x <= _NO_TURN_RAD:  # n is 0, and the rest as below: a third less
+        z = x * x
+        tail = _S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * (_S6 + z * _S7))))))
+        return x + x * (z * tail)
     if not -_SINE_MAX_RAD < x < _SINE_MAX_RAD:
         return x - x
     n = (x * _ONE_OVER_PI + _ROUNDING) - _ROUNDING
@@ -78,15 +85,24 @@ def _exponential(x: float) -> tuple[float, float]:
     x = -_EXPONENT_MAX if x < -_EXPONENT_MAX else min(x, _EXPONENT_MAX)
     k = (x * _ONE_OVER_LN2 + _ROUNDING) - _ROUNDING
     r = (x - k * _LN2_1) - k * _LN2_2
+    return r + r * r * _tail(r), ldexp(1.0, int(k))
+
+
+def _tail(r: float) -> float:
+    """Return (e**r - 1 - r) / r**2 for an r of half a ln 2 at most."""
     # fmt: off
-    tail = _E0 + r * (_E1 + r * (_E2 + r * (_E3 + r * (_E4 + r * (_E5 + r * (_E6 + r * (
+    return _E0 + r * (_E1 + r * (_E2 + r * (_E3 + r * (_E4 + r * (_E5 + r * (_E6 + r * (
         _E7 + r * (_E8 + r * (_E9 + r * _E10)))))))))
     # fmt: on
-    return r + r * r * tail, ldexp(1.0, int(k))
 
 
 def expm1(x: float) -> float:
     """Return e**x - 1 to 2 units in the last place; beyond +-700 that of 700, NaN of NaN."""
+    if -_NO_SCALE <= x <= _NO_SCALE:  # k is 0, and the rest as below: a third less
+        # fmt: off
+        return x + x * x * (_E0 + x * (_E1 + x * (_E2 + x * (_E3 + x * (_E4 + x * (_E5 + x * (_E6 + x * (
+            _E7 + x * (_E8 + x * (_E9 + x * _E10))))))))))
+        # fmt: on
     if x != x:
         return x
     p, scale = _exponential(x)
@@ -95,6 +111,8 @@ def expm1(x: float) -> float:
 
 def exponential(x: float) -> float:
     """Return e**x to 2 units in the last place; beyond +-700 that of 700, NaN of NaN."""
+    if -_NO_SCALE <= x <= _NO_SCALE:
+        return 1.0 + expm1(x)
     if x != x:
         return x
     p, scale = _exponential(x)
@@ -107,8 +125,8 @@ def inverse_cube_root(x: float) -> float:
     A cubic starts within 2 %; two steps of the series of (1 - h)**(-1/3), h = 1 - x y**3, end it.
     """
     mantissa, exponent = frexp(x)
-    third, rest = divmod(exponent + 1022, 3)
-    m = ldexp(mantissa, rest + 1)  # in [1, 8)
+    third = (exponent + 1022) // 3
+    m = mantissa * _DOUBLES[exponent + 1022 - 3 * third]  # in [1, 8)
     y = _C0 + m * (_C1 + m * (_C2 + m * _C3))
     h = 1.0 - m * (y * y * y)
     y = y + y * (h * (_THIRD + h * (_TWO_NINTHS + h * _FOURTEEN_81ST)))

@@ -258,12 +258,13 @@ class SuperTwisting:
         gains = _per_step(matched_gains(self.mu0 * dt), dt)
         return (*luenberger_copy(dt, self._f0, self._L1, self._L2).differences(), *gains)
 
-    def _sliding_gains(self, b: float, dt: float) -> ObserverGains:
+    def _sliding_gains(self, b: float, dt: float) -> tuple[float, float, float]:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
         size, M, mu = abs(b), self.M, self.mu0
         if size >= _INNOVATION_MIN_RAD and M >= _SLOPE_MIN_RAD_S3:
             mu = inverse_cube_root(size / M)
-        return _per_step(matched_gains(mu * dt), dt)
+        k1, k2, k3 = matched_gains(mu * dt)
+        return k1, k2 / dt, k3 / (dt * dt)
 
 
 def tune(
