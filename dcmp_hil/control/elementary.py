@@ -16,12 +16,7 @@ _WHOLE = 2251799813685248.0  # 2**51: from here on the sum with it is not exact
 _SINE_MAX_RAD = 1073741824.0  # 2**30: one bit of it is 1e-7 rad
 _ONE_OVER_PI = 0.3183098861837907
 _PI_1, _PI_2, _PI_3 = 3.1415926534682512, 1.2154201012607932e-10, 4.044532497591901e-21  # 32, 32 and 53 bits
-_NO_TURN_RAD = 1.57  # within half of pi, also after the product with 1/pi is rounded
 _HALF_PI = 1.5707963267948966
-_S0, _S1, _S2, _S3 = -0.16666666666666666, 0.00833333333333321, -0.00019841269841214512, 2.755731921199205e-06
-_S4, _S5, _S6, _S7 = (
-    -2.505210694675562e-08, 1.6058943226030913e-10, -7.643078395757952e-13, 2.722044477790634e-15,
-)  # fmt: skip
 
 _EXPONENT_MAX = 700.0
 _NO_SCALE = 0.34  # within half of ln 2
@@ -60,24 +55,40 @@ def sine(x: float) -> float:
 
     0 beyond 2**30 rad, where one bit of x is 1e-7 rad; NaN for an argument that is not finite.
     """
-    if -_NO_TURN_RAD <= x <= _NO_TURN_RAD:  # n is 0, and the rest as below: a third less
-        z = x * x
-        tail = _S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * (_S6 + z * _S7))))))
-        return x + x * (z * tail)
-    if not -_SINE_MAX_RAD < x < _SINE_MAX_RAD:
-        return x - x
-    n = (x * _ONE_OVER_PI + _ROUNDING) - _ROUNDING
-    r = ((x - n * _PI_1) - n * _PI_2) - n * _PI_3
-    half = 0.5 * n
-    odd = half - ((half + _ROUNDING) - _ROUNDING)  # 0, or a half either way
+    r, sign = x, 1.0
+    if not -_HALF_PI <= x <= _HALF_PI:
+        if not -_SINE_MAX_RAD < x < _SINE_MAX_RAD:
+            return x - x
+        n = (x * _ONE_OVER_PI + _ROUNDING) - _ROUNDING
+        r = ((x - n * _PI_1) - n * _PI_2) - n * _PI_3
+        half = 0.5 * n
+        odd = half - ((half + _ROUNDING) - _ROUNDING)  # 0, or a half either way
+        sign = 1.0 - 8.0 * odd * odd
     z = r * r
-    tail = _S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * (_S6 + z * _S7))))))
-    return (1.0 - 8.0 * odd * odd) * (r + r * (z * tail))
+    # fmt: off  # numbers in the line: 0.03 us less than names
+    tail = -0.16666666666666666 + z * (
+        0.00833333333333321
+        + z
+        * (
+            -0.00019841269841214512
+            + z
+            * (
+                2.755731921199205e-06
+                + z
+                * (
+                    -2.505210694675562e-08
+                    + z * (1.6058943226030913e-10 + z * (-7.643078395757952e-13 + z * 2.722044477790634e-15))
+                )
+            )
+        )
+    )
+    # fmt: on
+    return sign * (r + r * (z * tail))
 
 
 def cosine(x: float) -> float:
-    """Return cos x, `x` in rad, as the sine a quarter of a turn on: to 2e-16 and half a unit of x."""
-    return sine(x + _HALF_PI)
+    """Return cos x, `x` in rad, as the sine of what a quarter turn leaves: to 2e-16 and half a unit of x."""
+    return sine(_HALF_PI - abs(x))
 
 
 def _exponential(x: float) -> tuple[float, float]:
@@ -112,7 +123,10 @@ def expm1(x: float) -> float:
 def exponential(x: float) -> float:
     """Return e**x to 2 units in the last place; beyond +-700 that of 700, NaN of NaN."""
     if -_NO_SCALE <= x <= _NO_SCALE:
-        return 1.0 + expm1(x)
+        # fmt: off
+        return 1.0 + (x + x * x * (_E0 + x * (_E1 + x * (_E2 + x * (_E3 + x * (_E4 + x * (_E5 + x * (_E6 + (
+            x * (_E7 + x * (_E8 + x * (_E9 + x * _E10))))))))))))
+        # fmt: on
     if x != x:
         return x
     p, scale = _exponential(x)

@@ -118,9 +118,7 @@ class SweepRun:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not (folder / FILE_NAME).exists() and any(folder.glob("part-*.parquet")):
-                raise ConfigError(
-                    f"{folder}: parts without a manifest. Choose another --out."
-                )
+                raise ConfigError(f"{folder}: parts without a manifest. Choose another --out.")
             stack.enter_context(locked(folder))
             known = {block.number: read_part(folder, block, self._prepared.schema) for block in self.blocks}
             self._tables = {number: table for number, table in known.items() if table is not None}

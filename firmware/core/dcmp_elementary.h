@@ -56,7 +56,7 @@ static inline real dcmp_sine(real x)
 /* cos x, x in rad. */
 static inline real dcmp_cosine(real x)
 {
-    return dcmp_sine(x + REAL(1.5707963267948966));
+    return dcmp_sine(REAL(1.5707963267948966) - dcmp_magnitude(x));
 }
 
 /* e^x = scale (1 + p), for x limited to +-DCMP_EXPONENT_MAX. */

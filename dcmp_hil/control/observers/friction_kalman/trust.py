@@ -7,6 +7,7 @@ and not the size of the innovations.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from dcmp_hil.control.elementary import exponential
 
@@ -27,6 +28,12 @@ _CALM_S, _CALM_STEP_MAX = 0.3, 50.0  # s; by how much m counts above its mean
 _SCATTER_RATE, _SCATTER_MEAN, _SCATTER_MAX = 0.02, 1.5, 30.0
 _SCATTER_CLIP, _SCATTER_INFLATION_MAX = 9.0, 10.0
 _STEP_CHI2 = 30.0
+
+
+@lru_cache(maxsize=256)  # 0.2 us less: a clock that is even has few steps that differ in their last bits
+def _kept(step: float) -> float:
+    """Return what is left of m after a step, s."""
+    return exponential(-step / _DECAY_S)
 
 
 def judged(trust: Trust, nu: float, step: float, edge: bool) -> Trust:
@@ -60,7 +67,7 @@ def judged(trust: Trust, nu: float, step: float, edge: bool) -> Trust:
     if target > m:
         m = min(target, _INFLATION_MAX)
     elif m != 1.0:
-        m = target + (m - target) * exponential(-step / _DECAY_S)
+        m = target + (m - target) * _kept(step)
     calm += (m - calm if m < calm + _CALM_STEP_MAX else _CALM_STEP_MAX) * step / _CALM_S
     return m, slope_m, calm, slow, fast, scatter
 
@@ -69,7 +76,7 @@ def calmed(trust: Trust, step: float) -> Trust:
     """Return the trust at the end of a step without an innovation."""
     m, slope_m, calm, slow, fast, scatter = trust
     if m != 1.0:
-        m = 1.0 + (m - 1.0) * exponential(-step / _DECAY_S)
+        m = 1.0 + (m - 1.0) * _kept(step)
     return (
         m,
         slope_m,
