@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from dcmp_hil.errors import BackendError, ConfigError, DcmpError, DeadlineError, TripError
     from dcmp_hil.platform.clock import Clock
     from dcmp_hil.result import Result
+    from dcmp_hil.sweeping.api import sweep
+    from dcmp_hil.sweeping.result import SweepResult
     from dcmp_hil.telemetry.recorder import Sink
     from dcmp_hil.telemetry.statistics import Summary
     from dcmp_hil.values import Cycle, Estimate, Event, Fault, Reference, Sample, Truth
@@ -51,10 +53,12 @@ _HOMES = {
     "Sample": "dcmp_hil.values",
     "Sink": "dcmp_hil.telemetry.recorder",
     "Summary": "dcmp_hil.telemetry.statistics",
+    "SweepResult": "dcmp_hil.sweeping.result",
     "TripError": "dcmp_hil.errors",
     "Truth": "dcmp_hil.values",
     "load_rig": "dcmp_hil.config",
     "run": "dcmp_hil.api",
+    "sweep": "dcmp_hil.sweeping.api",
 }
 
 __all__ = [
@@ -79,11 +83,13 @@ __all__ = [
     "Sample",
     "Sink",
     "Summary",
+    "SweepResult",
     "TripError",
     "Truth",
     "__version__",
     "load_rig",
     "run",
+    "sweep",
 ]
 
 

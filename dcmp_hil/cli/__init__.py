@@ -26,6 +26,7 @@ from dcmp_hil.cli.ports import ports
 from dcmp_hil.cli.replay import replay
 from dcmp_hil.cli.rigs import rigs
 from dcmp_hil.cli.run import run
+from dcmp_hil.cli.sweep import sweep
 from dcmp_hil.cli.usage import Commands, sentence
 from dcmp_hil.cli.view import view
 from dcmp_hil.errors import ConfigError, DcmpError, ExitCode
@@ -63,6 +64,7 @@ def _on_linux(name: str, command: Callable[P, None]) -> Callable[P, None]:
 EVERYWHERE: dict[str, Callable[..., None]] = {
     "run": run,
     "check": check,
+    "sweep": sweep,
     "paper": paper,
     "replay": replay,
     "export": export,

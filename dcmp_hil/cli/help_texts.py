@@ -56,6 +56,15 @@ HELP = {
             "dcmp-hil check my.toml --set model.f1_rad_s2=1.55 --write",
         ),
     ),
+    "sweep": CommandHelp(
+        RUN,
+        "Run a rig many times, over a grid or draws of its keys.",
+        (
+            "dcmp-hil sweep friction_sweep.toml --dry-run",
+            "dcmp-hil sweep friction_sweep.toml --out sweeps/friction",
+            "dcmp-hil sweep gains.toml --scheduler tcp://10.0.0.5:8786",
+        ),
+    ),
     "rigs": CommandHelp(
         RUN,
         "List the shipped rigs, or copy one to start from.",

@@ -56,13 +56,13 @@ class BlockWork:
         Of the sweep.
     base
         Its rig, `[set]` included.
-    engine
-        Name of the only engine to be used; empty for the first that takes a rig.
+    plain
+        Whether every run is made by the plain loop; else by the first engine that takes it.
     """
 
     spec: SweepSpec
     base: Rig
-    engine: str = ""
+    plain: bool = False
 
     def __call__(self, block: SweepBlock) -> list[RunRow]:
         """Return a row for each run of a block, in their order."""
@@ -89,7 +89,7 @@ class BlockWork:
     def engines(self) -> dict[str, SweepEngine]:
         """Return the engines that may be used, the fastest first."""
         found: dict[str, SweepEngine] = {}
-        if not self.spec.faults and self.engine != PLAIN:
+        if not self.spec.faults and not self.plain:
             found[LANES] = _lanes()
         return {**found, PLAIN: PlainLoop(self.spec.faults)}
 

@@ -33,7 +33,7 @@ _SAMPLED_RUNS = 128  # that are looked at for engines and refusals
 _TIMED_CPU_S = 0.1  # s of work after which the timing of an engine ends
 _TIMED_PLAIN_S = (0.25, 1.0)  # s of device time: its cost is a start and so much a second
 _BLOCK_CPU_S = 1.0
-_BLOCKS_PER_WORKER = 4
+_BLOCKS_PER_WORKER = 10
 _PARTS_MAX = 20_000
 
 
@@ -100,7 +100,7 @@ class PreparedSweep:
         return min(total, max(runs, math.ceil(total / _PARTS_MAX)))
 
 
-def prepare(spec: SweepSpec, place: str, engine: str = "") -> PreparedSweep:
+def prepare(spec: SweepSpec, place: str, *, plain: bool = False) -> PreparedSweep:
     """Find out everything about a sweep before it starts; it takes some tenths of a second of work.
 
     Parameters
@@ -109,8 +109,8 @@ def prepare(spec: SweepSpec, place: str, engine: str = "") -> PreparedSweep:
         Of the sweep.
     place
         First word of messages.
-    engine
-        Name of the only engine to be used; empty for the fastest of each run.
+    plain
+        Whether every run is made by the plain loop; else by the fastest engine that takes it.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def prepare(spec: SweepSpec, place: str, engine: str = "") -> PreparedSweep:
     base = _base(spec, place)
     _check_values(spec, base, place)
     design = SweepDesign(spec)
-    work = BlockWork(spec, base, engine)
+    work = BlockWork(spec, base, plain)
     step = max(1, design.total // _SAMPLED_RUNS)
     numbers = range(0, design.total, step)[: _SAMPLED_RUNS + 1]
     rigs = variants(base, (design.named(number) for number in numbers))
@@ -173,8 +173,9 @@ def _values(spec: SweepSpec) -> Iterator[tuple[str, str, Scalar]]:
     for key, axis in zip(spec.grid, spec.axes, strict=True):
         yield from (("grid", key, value) for value in axis[: _CHECKED_MAX - 1] + axis[-1:])
     for key, rule in spec.draw.items():
-        means = None if rule.normal is None else rule.normal[:1]
-        ends: Sequence[Scalar] = rule.choice or rule.uniform or rule.loguniform or means or ()
+        ends: Sequence[Scalar] = rule.choice or (rule.normal or ())[:1]
+        if (span := rule.uniform or rule.loguniform) is not None:  # the upper end itself is never drawn
+            ends = (span[0], math.nextafter(span[1], span[0]))
         yield from (("draw", key, value) for value in ends)
 
 

@@ -21,7 +21,7 @@ from dcmp_hil.sweeping.manifest import (
 from dcmp_hil.sweeping.parts import load_pyarrow, read_part, table_of, write_part
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from dcmp_hil.sweeping.block_work import RunRow
@@ -123,20 +123,32 @@ class SweepRun:
             known = {block.number: read_part(folder, block, self._prepared.schema) for block in self.blocks}
             self._tables = {number: table for number, table in known.items() if table is not None}
             missing = [block for block in self.blocks if block.number not in self._tables]
-            self._require_room(folder, missing)
+            self.require_room(missing)
             write_manifest(folder, self._manifest)
         except OSError as error:
             raise ConfigError(f"{folder}: {error.strerror}. Choose another --out.") from None
         return missing
 
-    def _require_room(self, folder: Path, missing: list[SweepBlock]) -> None:
-        needed = self._prepared.bytes_of(sum(block.runs for block in missing), self._manifest.runs_per_part)
-        room = room_for(folder / FILE_NAME)
+    @property
+    def bytes_to_write(self) -> float:
+        """Bytes of all results, at most."""
+        return self._bytes_of(self.blocks)
+
+    def require_room(self, missing: Sequence[SweepBlock] | None = None) -> None:
+        """Raise ConfigError if the results of blocks, by default of all, have too little room on the disk."""
+        if self._folder is None:
+            return
+        needed = self._bytes_of(self.blocks if missing is None else missing)
+        room = room_for(_first_there(self._folder) / FILE_NAME)
         if needed > room:
             raise ConfigError(
-                f"{folder}: the results take up to {1e-6 * needed:,.1f} MB, and {1e-6 * room:,.1f} MB are "
-                "free there. Free some, choose another --out, or write fewer runs."
+                f"{self._folder}: the results take up to {1e-6 * needed:,.1f} MB, and {1e-6 * room:,.1f} MB "
+                "are free there. Free some, choose another --out, or write fewer runs."
             )
+
+    def _bytes_of(self, blocks: Sequence[SweepBlock]) -> float:
+        runs = sum(block.runs for block in blocks)
+        return self._prepared.bytes_of(runs, self._manifest.runs_per_part)
 
     def _keep(self, block: SweepBlock, rows: list[RunRow]) -> None:
         if self._folder is not None:
@@ -150,3 +162,8 @@ class SweepRun:
                     "command continues."
                 ) from None
         self._tables[block.number] = table_of(rows, self._prepared.schema)
+
+
+def _first_there(folder: Path) -> Path:
+    """Return a folder, or the nearest one around it that exists."""
+    return next((one for one in (folder, *folder.absolute().parents) if one.exists()), folder)

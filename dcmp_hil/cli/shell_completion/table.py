@@ -90,6 +90,8 @@ def _values(command: str, parameter: Any) -> Values:
         return Values(files=_ANY_FILE)
     if metavar == "RIG":
         return Values(tuple(shipped_rigs()), _RIG_FILE)
+    if metavar == "SPEC.toml":
+        return Values(files=_RIG_FILE)
     words: Mapping[str, Any] = {
         "KEY=VALUE": lambda: _keys(command, parameter.opts[0]),
         "KIND:...": _faults,
