@@ -11,6 +11,7 @@ import shutil
 import subprocess
 from typing import TYPE_CHECKING, NamedTuple
 
+from tests.firmware.core_library import HERE, law_headers
 from tests.target.build import FIRMWARE, needed
 from tools.boards import read_boards
 
@@ -141,6 +142,8 @@ def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Find
     for line in done.stderr.splitlines():
         if line:
             file, number, rule = line.split("\t")
+            if file.startswith(str(HERE)):  # the tests' own: only the headers that they include are looked at
+                continue
             found.add(Finding(rule.removeprefix("misra-c2012-"), file, int(number)))
     return sorted(found)
 
@@ -151,12 +154,17 @@ def _seen_by(file: Path, options: tuple[str, ...]) -> frozenset[str]:
     return _included(file, folders)
 
 
+def _folder_of(file: Path) -> tuple[str, ...]:
+    """Return the folder of a file, if it is in the firmware's."""
+    return (str(file.parent.relative_to(FIRMWARE)),) if file.is_relative_to(FIRMWARE) else ()
+
+
 @functools.cache
 def _included(file: Path, folders: tuple[str, ...]) -> frozenset[str]:
     """Return the headers of ours that a file sees, those of headers too."""
     seen: set[str] = set()
     for name in re.findall(r'^#include "(.+)"', file.read_text(), re.MULTILINE):
-        for folder in (str(file.parent.relative_to(FIRMWARE)), *folders):
+        for folder in (*_folder_of(file), *folders):
             header = FIRMWARE / folder / name
             if header.exists():
                 seen |= {f"{folder}/{name}"} | _included(header, folders)
@@ -176,6 +184,12 @@ PROGRAMS = {board.name: _of_board(board) for board in read_boards().values()} | 
         for_chip=False,
     ),
     "hostlib": Program(("boards/hostlib",), ("-I", "core"), for_chip=False),
+    "simlib": Program(("boards/simlib",), ("-I", "core"), for_chip=False),
+    "law": Program(
+        tuple(map(str, sorted(set(law_headers().values())))),
+        ("-I", "core", "-I", str(HERE)),
+        for_chip=False,
+    ),
 }
 """Whole programs, so that what is asked of one has its answer; of the rest what the others do not have."""
 

@@ -55,7 +55,7 @@ def _others(samples: Sequence[Sample], rig: ObserverContext, gains: Gains) -> Ar
     return np.concatenate([*found[1:], found[0]])
 
 
-def _r1_in_c(law: Law, samples: Sequence[Sample], rig: ObserverContext, gains: Gains) -> Array:
+def r1_in_c(law: Law, samples: Sequence[Sample], rig: ObserverContext, gains: Gains) -> Array:
     tuning, model = tune(rig, L1=4.9, L2=5.51, M=gains.M, mu0=gains.mu0), rig.model
     steps = [tuning.nominal, *(tuning.gaps[n] for n in range(2, 11))]
     cube = tuning.mu0 * tuning.mu0 * tuning.mu0
@@ -112,7 +112,7 @@ WANTED = {name: _r1_in_python(*given) for name, given in RIDES.items()}
 
 @pytest.mark.parametrize("name", RIDES)
 def test_r1_has_the_bits_of_python(core: Core, name: str) -> None:
-    assert same_bits(_r1_in_c(Law(core), *RIDES[name]), WANTED[name])
+    assert same_bits(r1_in_c(Law(core), *RIDES[name]), WANTED[name])
 
 
 def test_rides_reach_what_they_are_for() -> None:
@@ -212,7 +212,7 @@ SINGLE = {  # rad, rad/s and rad/s2: largest distance of float from double over 
 
 @pytest.mark.parametrize("name", SINGLE)
 def test_r1_in_single_precision_stays_near_that_in_double(core: Core, name: str) -> None:
-    got = _r1_in_c(Law(core, "float_"), *RIDES[name])
+    got = r1_in_c(Law(core, "float_"), *RIDES[name])
     apart = np.abs(got - WANTED[name]).max(axis=0)
     assert (apart <= SINGLE[name]).all()
 

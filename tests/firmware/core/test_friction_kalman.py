@@ -54,7 +54,7 @@ def _made(settings: Settings) -> tuple[FrictionKalman, FrictionPredictor]:
     return observer, FrictionPredictor(observer, rig, settings.delay, measured=False)
 
 
-def _in_python(samples: Sequence[Sample], settings: Settings) -> Array:
+def in_python(samples: Sequence[Sample], settings: Settings) -> Array:
     """Return what the check in C puts out: estimate, state, covariance, trust, sticks, steps, state ahead."""
     observer, predictor = _made(settings)
     found = list[tuple[float, ...]]()
@@ -79,7 +79,7 @@ def _rows(samples: Sequence[Sample]) -> Array:
     )
 
 
-def _in_c(law: Law, samples: Sequence[Sample], settings: Settings) -> Array:
+def in_c(law: Law, samples: Sequence[Sample], settings: Settings) -> Array:
     setup = vars(_made(settings)[0])
     numbers = np.array([setup[name] for name in SETUP])
     return law("friction_kalman", numbers, T, settings.delay, _rows(samples), width=WIDTH)
@@ -119,12 +119,12 @@ RIDES: dict[str, tuple[list[Sample], Settings]] = {
     "no position": (_spoilt(QUIET, "position"), Settings()),
     "no voltage": (_spoilt(QUIET, "voltage"), Settings()),
 }
-WANTED = {name: _in_python(*given) for name, given in RIDES.items()}
+WANTED = {name: in_python(*given) for name, given in RIDES.items()}
 
 
 @pytest.mark.parametrize("name", RIDES)
 def test_filter_and_prediction_have_the_bits_of_python(core: Core, name: str) -> None:
-    assert same_bits(_in_c(Law(core), *RIDES[name]), WANTED[name])
+    assert same_bits(in_c(Law(core), *RIDES[name]), WANTED[name])
 
 
 def test_rides_reach_what_they_are_for() -> None:
@@ -246,6 +246,6 @@ def test_trust_has_the_bits_of_python(core: Core) -> None:
 @pytest.mark.parametrize(("name", "bounds"), [("quiet", (2e-6, 1e-4, 2e-3)), ("at rest", (1e-5, 1e-3, 0.03))])
 def test_filter_in_single_precision(core: Core, name: str, bounds: tuple[float, ...]) -> None:
     samples, settings = RIDES[name]
-    got = _in_c(Law(core, "float_"), samples[:1000], settings)
+    got = in_c(Law(core, "float_"), samples[:1000], settings)
     apart = np.abs(got[:, :3] - WANTED[name][:1000, :3]).max(axis=0)
     assert (apart <= bounds).all()
