@@ -102,16 +102,32 @@ class Trajectory:
         since = t - self._t0
         reference = self._source.at(since)
         if since < self._soft_start:
-            return _faded_in(reference, self._x0, since / self._soft_start, self._soft_start)
+            return _faded_in(reference, self._x0, fade(since, self._soft_start))
         return reference
 
 
-def _faded_in(reference: Reference, x0: float, s: float, length: float) -> Reference:
-    """x0 b + (1 - b) x_r with b = 1 - (10 s^3 - 15 s^4 + 6 s^5), and its exact derivatives."""
-    s = max(s, 0.0)
+def fade(since: float, length: float) -> tuple[float, float, float]:
+    """Return the weight of the reference in a soft start, with its exact derivatives (1/s, 1/s2).
+
+    It is b = 10 s^3 - 15 s^4 + 6 s^5 with s = since / length.
+
+    Parameters
+    ----------
+    since
+        s, from the beginning of the trajectory on.
+    length
+        s, of the soft start.
+    """
+    s = max(since / length, 0.0)
     gone = s * s * s * (10.0 + s * (6.0 * s - 15.0))
     gone1 = 30.0 * s * s * (1.0 - s) ** 2 / length
     gone2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length)
+    return gone, gone1, gone2
+
+
+def _faded_in(reference: Reference, x0: float, weights: tuple[float, float, float]) -> Reference:
+    """(1 - b) x0 + b x_r, and its exact derivatives."""
+    gone, gone1, gone2 = weights
     x, v, a = reference
     return Reference(
         x0 + gone * (x - x0), gone * v + gone1 * (x - x0), gone * a + 2.0 * gone1 * v + gone2 * (x - x0)

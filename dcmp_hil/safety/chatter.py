@@ -55,7 +55,7 @@ class Chatter:
     """
 
     def __init__(self, expected: float, period: float, count: float) -> None:
-        self.block = max(1, round(BLOCK_DURATION_S / period))
+        self.block = block_cycles(period)
         self.samples: Collection[Sample] = ()
         self._count = count
         self._rates: deque[float] = deque(maxlen=_WINDOW_BLOCKS + 1)  # V/s, of the newest blocks
@@ -97,6 +97,11 @@ class Chatter:
         """Return the likely cause of the chatter, with its remedy."""
         sentence, remedy = cause_of(self.samples, self._count)
         return Explanation("chatter", f"{sentence}: {said}", remedy)
+
+
+def block_cycles(period: float) -> int:
+    """Return the cycles of a block; `period` in s."""
+    return max(1, round(BLOCK_DURATION_S / period))
 
 
 def limit_V_s(expected: float) -> float:

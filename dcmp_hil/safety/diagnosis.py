@@ -77,7 +77,7 @@ class Diagnosis:
     def __init__(self, setting: ObserverContext) -> None:
         self._model, counts = setting.model, setting.counts_per_rev
         self._noise = math.hypot(_NOISE_COUNTS * (math.tau / counts if counts else 0.0), _NOISE_MIN_RAD)
-        self._seen: deque[Sample] = deque(maxlen=max(_SAMPLES_MIN, round(_WINDOW_S / setting.period)))
+        self._seen: deque[Sample] = deque(maxlen=window_samples(setting.period))
         self.add = self._seen.append
         """Remember a sample; called every cycle, so there is no function around it."""
 
@@ -121,6 +121,11 @@ class Diagnosis:
         reasons = {"power": _POWER, "motor": _POLARITY, "encoder": _POLARITY, "stuck": _STUCK}
         for name, logs in found.items():
             yield reasons.get(name, _OTHER_CAUSE), float(np.logaddexp.reduce(logs))
+
+
+def window_samples(period: float) -> int:
+    """Return how many samples the last 100 ms have; `period` in s."""
+    return max(_SAMPLES_MIN, round(_WINDOW_S / period))
 
 
 def moved_by(t: Vector, acceleration: Vector) -> Vector:

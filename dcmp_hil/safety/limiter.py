@@ -21,7 +21,8 @@ _SATURATION_TIME_MAX_S = 0.5  # s in a row at a limit of the voltage that end th
 _TRACKING_ERROR_TIME_MAX_S = 0.5
 """Seconds in a row that the arm may be too far from the reference: a step takes less."""
 _SPEED_UP_TIME_MIN_S = 0.02  # s from rest to the largest velocity
-_CONSECUTIVE_GAP_PERIODS_MAX = 2.5  # periods between two at most
+CONSECUTIVE_GAP_PERIODS_MAX = 2.5
+"""Periods between two cycles of one condition, at most."""
 
 
 class _Lasting:
@@ -66,6 +67,8 @@ class Limiter:
     ----------
     voltage_limit
         V, either way.
+    bounds
+        Of the reference.
     clamped
         Periods in which the demand was more than the limits allowed.
     objection
@@ -89,14 +92,14 @@ class Limiter:
         self.voltage_limit, self._step = voltage, slew * period
         self._x, self._v, self._error = position, velocity, error
         self._a = min(acceleration, velocity / _SPEED_UP_TIME_MIN_S)
-        bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
-        self._governor = ReferenceGovernor(bounds) if math.isfinite(position + velocity) else None
+        self.bounds = Bounds(position, velocity, self._a, min(braking, self._a), strongest)
+        self._governor = ReferenceGovernor(self.bounds) if math.isfinite(position + velocity) else None
         self._notify = notify
         self.objection: TripRequest | None = None
         self._slews = slew < math.inf
         self._rate_limit = RateLimit(_EVENT_PERIOD_S)
-        self._saturated = _Lasting(_SATURATION_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
-        self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, _CONSECUTIVE_GAP_PERIODS_MAX * period)
+        self._saturated = _Lasting(_SATURATION_TIME_MAX_S, CONSECUTIVE_GAP_PERIODS_MAX * period)
+        self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, CONSECUTIVE_GAP_PERIODS_MAX * period)
         self.clamped = 0
         self._chatter: Chatter | None = None
         self._change = 0.0  # V, sum of |dV| in this block

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _HEALTHY = Fault.NONE  # found here faster than in its class
 _MINUS_INF, _INF = -math.inf, math.inf
+_FILTER_TIME_S, _ABOVE_TIME_S = 10e-3, 5e-3  # s, of the watching observer's disturbance
 
 
 class FiniteMonitor:
@@ -116,16 +117,16 @@ class DisturbanceWatch:
         observer: Observer,
         setting: ObserverContext,
         limit: float,
-        for_: float = 5e-3,
+        for_: float = _ABOVE_TIME_S,
         ranges: RangeMonitor | None = None,
     ) -> None:
         self._ranges = ranges
         self._velocity_max = ranges.velocity_max if ranges else math.inf
         self._diagnosis = Diagnosis(setting)
         self._remember, self._update = self._diagnosis.add, observer.update
-        self._keep = math.exp(-setting.period / 10e-3)
+        self._keep = filter_keep(setting.period)
         self._limit = limit
-        self._allowed = max(1, round(for_ / setting.period))
+        self._allowed = cycles_above(setting.period, for_)
         self._filtered = 0.0
         self._above = 0
 
@@ -162,3 +163,13 @@ class DisturbanceWatch:
         """Return the likely cause; finding it takes longer than 0 V may wait."""
         reason, sentence, remedy = self._diagnosis.finding()
         return Explanation(reason, f"{sentence}: {figures}", remedy)
+
+
+def filter_keep(period: float) -> float:
+    """Return how much of the filtered disturbance is left after a period (s)."""
+    return math.exp(-period / _FILTER_TIME_S)
+
+
+def cycles_above(period: float, time: float = _ABOVE_TIME_S) -> int:
+    """Return the cycles of a period (s) that the disturbance may not stay above its limit; `time` in s."""
+    return max(1, round(time / period))

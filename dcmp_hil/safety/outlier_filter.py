@@ -32,11 +32,15 @@ class OutlierFilter:
     ----------
     count
         Samples left out so far.
+    usual
+        rad, from one sample to the next: what needs no further look.
+    speed, floor
+        rad/s and rad: what is more than both of them since the last sample, is off.
     """
 
     def __init__(self, velocity_limit: float, period: float, count: float) -> None:
-        self._speed, self._floor = _VELOCITY_LIMIT_RATIO * velocity_limit, _JUMP_MIN_COUNTS * count
-        self._usual = max(self._speed * period, self._floor)  # rad, from one sample to the next
+        self.speed, self.floor = _VELOCITY_LIMIT_RATIO * velocity_limit, _JUMP_MIN_COUNTS * count
+        self.usual = max(self.speed * period, self.floor)  # rad, from one sample to the next
         self._stop: TripRequest | None = None
         self._x = self._t = math.nan
         self._samples = 0
@@ -47,7 +51,7 @@ class OutlierFilter:
         """Return whether to read on: this sample's position is off, and may be left out."""
         self._samples += 1
         t, x, _, _ = sample
-        if abs(x - self._x) <= self._usual:
+        if abs(x - self._x) <= self.usual:
             self._t, self._x = t, x
             return False
         return self._is_off(sample)
@@ -58,7 +62,7 @@ class OutlierFilter:
 
     def _is_off(self, sample: Sample) -> bool:
         moved = abs(sample.position - self._x)
-        allowed = max(self._speed * (sample.t - self._t), self._floor)
+        allowed = max(self.speed * (sample.t - self._t), self.floor)
         # The first sample, and what is no number, are for others to judge; a device's fault goes first.
         if not allowed < moved < math.inf or sample.fault:
             self._t, self._x, _, _ = sample

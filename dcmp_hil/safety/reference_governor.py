@@ -18,8 +18,10 @@ _APPROACH_ACCELERATION_SHARE = 0.5  # of the acceleration, that the way to a pos
 _PULL_1_S, _DAMPING_1_S = 5.0, 15.0  # 1/s, of a small distance; of the velocity
 _ACCELERATION_LAG_S = 0.02  # s, over which its own acceleration changes: the voltage has no steps from it
 _JOIN_TOLERANCES = Reference(5e-4, 0.02, 2.0)  # rad, rad/s, rad/s2: so close it goes over into the reference
-_JUMP_MAX_RAD = 2.0  # larger jumps are governed
-_OVERSHOOT_SHARE = 0.4  # of a jump
+JUMP_MAX_RAD = 2.0
+"""Largest jump that is not governed, rad."""
+OVERSHOOT_SHARE = 0.4
+"""Of a jump, by which the arm may go beyond it."""
 _MOTOR_GAIN_RATIO_MAX = 1.5  # times the believed motor gain
 _JUMP_INTERVAL_MIN_S = 0.5  # s
 _GAP_MAX_S, _INTEGRATION_STEP_S = 0.1, 2e-3  # s
@@ -34,16 +36,21 @@ class Bounds(NamedTuple):
     braking: float  # rad/s2, of a stop, and of its own motion
     strongest: float = math.inf  # rad/s2, of the motor at full voltage
 
+    @property
+    def stop(self) -> float:
+        """Way that a stop takes over the square of the velocity, s2/rad."""
+        return 0.5 / (_BRAKING_ACCELERATION_SHARE * self.braking)
+
     def jump(self, target: float, distance: float) -> bool:
         """Return whether a jump to `target` (rad) over `distance` may be left to the controller."""
         size = abs(distance)
+        return self.short(size) and abs(target) + OVERSHOOT_SHARE * size <= self.position
+
+    def short(self, size: float) -> bool:
+        """Return whether a jump of this size (rad) is no longer and no faster than one may be."""
         known = math.isfinite(self.strongest)  # else it is a simulation without a limit
         fastest = math.sqrt(_MOTOR_GAIN_RATIO_MAX * self.strongest * size) if known else 0.0
-        return (
-            size <= _JUMP_MAX_RAD
-            and abs(target) + _OVERSHOOT_SHARE * size <= self.position
-            and fastest <= self.velocity
-        )
+        return size <= JUMP_MAX_RAD and fastest <= self.velocity
 
 
 class ReferenceGovernor:
@@ -65,7 +72,7 @@ class ReferenceGovernor:
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
         self._x, self._v, self._a, self._own, _ = bounds
-        self._stop = 0.5 / (_BRAKING_ACCELERATION_SHARE * bounds.braking)
+        self._stop = bounds.stop
         self._t = self._jumped = -math.inf
         self.last = Reference(math.nan, 0.0, 0.0)
         self.leads = False

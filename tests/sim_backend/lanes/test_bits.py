@@ -1,0 +1,125 @@
+"""The outcome of a lane has the bits of the plain loop, on every build and at every number of lanes."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dcmp_hil.sweeping.plain_loop import PlainLoop
+from sim_backend.compiling import build
+from sim_backend.lanes import engine, library
+from sim_backend.lanes.engine import LaneEngine
+from sim_backend.lanes.instruction_sets import SETS, here
+from tests.sim_backend.lanes.runs import CASES, TRIPS, drawn, rig_of, unequal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dcmp_hil.config import Rig
+    from dcmp_hil.sweeping.engine import RunOutcome
+    from sim_backend.lanes.instruction_sets import InstructionSet
+    from sim_backend.lanes.library import Lanes
+
+_PROMISED = {"nominal", "saturated", "lost samples", "1024 counts", "65536 counts", "ideal encoder"}
+_MIXED_S = 0.4
+
+
+@pytest.fixture
+def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no run be repeated by the plain loop."""
+
+    def refuse(_: PlainLoop, rigs: Sequence[Rig], duration_s: float) -> list[RunOutcome]:
+        assert not rigs, f"repeated: {len(rigs)} runs of {duration_s} s"
+        return []
+
+    class _None(PlainLoop):
+        run = refuse
+
+    monkeypatch.setattr(engine, "PlainLoop", _None)
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("name", CASES)
+def test_a_lane_has_the_bits_of_the_plain_loop(name: str) -> None:
+    number = 20 if name in _PROMISED else 3
+    assert not unequal(LaneEngine(), drawn(number, CASES[name]), 0.8)
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("name", TRIPS)
+def test_a_lane_trips_as_the_plain_loop_does(name: str) -> None:
+    overrides, causes = TRIPS[name]
+    rigs = drawn(2, overrides)
+    found = {outcome.trip_cause for outcome in LaneEngine().run(rigs, 2.2)}
+    assert found & causes
+    assert found <= causes | {""}
+    assert not unequal(LaneEngine(), rigs, 2.2)
+
+
+def _mixed() -> list[Rig]:
+    """Return rigs of several groups, with more than one block of one, and with trips."""
+    overrides = [*CASES.values(), *(chosen for chosen, _ in TRIPS.values())]
+    return [*drawn(9, ()), *(rig for k, chosen in enumerate(overrides) for rig in drawn(2, chosen, k))]
+
+
+@pytest.fixture(scope="module")
+def expected() -> list[str]:
+    """Return the outcomes of the mixed rigs by the usual build."""
+    return [repr(outcome) for outcome in LaneEngine().run(_mixed(), _MIXED_S)]
+
+
+def _outcomes(load: partial[Lanes], threads: int = 1) -> list[str]:
+    return [repr(outcome) for outcome in LaneEngine(threads, load).run(_mixed(), _MIXED_S)]
+
+
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+def test_bits_do_not_depend_on_the_number_of_lanes(expected: list[str], lanes: int) -> None:
+    assert _outcomes(partial(library.load, lanes)) == expected
+
+
+@pytest.mark.parametrize("chosen", SETS, ids=[one.name for one in SETS])
+def test_bits_do_not_depend_on_the_instruction_set(expected: list[str], chosen: InstructionSet) -> None:
+    if chosen not in here():
+        pytest.skip(f"this processor has no {chosen.name}")
+    assert _outcomes(partial(library.load, library.LANES, chosen)) == expected
+
+
+def test_bits_do_not_depend_on_the_compiler(expected: list[str], tmp_path: Path) -> None:
+    compiler = shutil.which("clang")
+    if compiler is None:
+        pytest.skip("no clang here: apt install clang")
+    made = tmp_path / "liblanes.so"
+    root = build.sources()
+    command = [compiler, "-std=c11", "-Werror", *library.flags_for(here()[0], library.LANES)]
+    source = root / "boards/simlib/lanes.c"
+    subprocess.run([*command, f"-I{root / 'core'}", "-o", str(made), str(source)], check=True)
+    assert _outcomes(partial(library.load_file, made, library.LANES)) == expected
+
+
+def test_bits_do_not_depend_on_threads(expected: list[str]) -> None:
+    assert _outcomes(partial(library.load), threads=2) == expected
+
+
+def test_a_reference_that_must_be_led_is_for_the_plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = (
+        "reference.kind=step",
+        "reference.at_s=0.2",
+        "reference.after_rad=2.5",
+        "reference.soft_start_s=0.1",
+    )
+    rigs = [rig_of(*step), *drawn(1, ())]
+    repeated: list[int] = []
+
+    class _Counted(PlainLoop):
+        def run(self, rigs: Sequence[Rig], duration_s: float) -> list[RunOutcome]:
+            repeated.append(len(rigs))
+            return super().run(rigs, duration_s)
+
+    monkeypatch.setattr(engine, "PlainLoop", _Counted)
+    assert not unequal(LaneEngine(), rigs, 0.5)
+    assert sum(repeated) == 1
