@@ -1,4 +1,4 @@
-"""What `dcmp-hil sweep` does: prepare, run with a progress bar, print what came of it."""
+"""The command `dcmp-hil sweep`, step by step: prepare, run with a progress bar, print what came of it."""
 
 from __future__ import annotations
 

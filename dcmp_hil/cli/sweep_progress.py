@@ -45,7 +45,7 @@ class SweepProgress:
 
     @property
     def words(self) -> str:
-        """How many runs are kept."""
+        """Number of runs that are kept, in words."""
         return (
             f"{self._runs:,} of {self._total:,} runs are kept" if self.began else "nothing was run: no runs"
         )

@@ -1,4 +1,4 @@
-"""What `dcmp-hil sweep` prints: what it would take, quantiles, and the worst runs."""
+"""Lines of `dcmp-hil sweep`: what it would take, quantiles, and the worst runs."""
 
 from __future__ import annotations
 

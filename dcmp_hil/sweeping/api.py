@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dcmp_hil.plugins.named_class import find_named
+from dcmp_hil.sweeping.executor import CLUSTER
 from dcmp_hil.sweeping.local_executor import InProcess, Processes, cores
 from dcmp_hil.sweeping.preparation import prepare
 from dcmp_hil.sweeping.result import SweepResult
@@ -82,8 +84,7 @@ def executor_for(cpu_s: float, workers: int | None, scheduler: str) -> Executor:
         If there is no such scheduler.
     """
     if scheduler:
-        from dcmp_hil.sweeping.cluster import DaskCluster
-
-        return DaskCluster(scheduler)
+        cluster: Executor = find_named(CLUSTER, "--scheduler")(scheduler)
+        return cluster
     count = workers or (1 if cpu_s < _WORTH_PROCESSES_S else cores())
     return InProcess() if count == 1 else Processes(count)

@@ -1,4 +1,4 @@
-"""The work of one block of a sweep, wherever it is done: rigs, the engine of each, figures."""
+"""The work of one block of a sweep: rigs, the engine of each, figures."""
 
 from __future__ import annotations
 

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
+CLUSTER = "dcmp_hil.sweeping.cluster:DaskCluster"
+"""`module:Class` of the executor of `--scheduler`, made as Class(address)."""
+
+
 class SweepBlock(NamedTuple):
     """Consecutive runs of a sweep, which one worker runs: at least a second of work where there is as much.
 

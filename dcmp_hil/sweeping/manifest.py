@@ -24,10 +24,10 @@ _FORMAT = 1
 
 
 class Manifest(NamedTuple):
-    """What the parts of a folder are."""
+    """Description of the parts of a folder."""
 
     about: dict[str, Any]
-    """Spec, rig and version of the arithmetic; the results are those of this."""
+    """Spec, rig and version of the arithmetic, on which the results depend."""
     runs_per_part: int
 
     @property

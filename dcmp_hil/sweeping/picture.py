@@ -164,6 +164,7 @@ def _distribution(axes: Axes, error: NDArray[np.float64]) -> None:
                           color=_DARK_BLUE)  # fmt: skip
     else:
         axes.text(0.5, 0.5, "no run was whole", transform=axes.transAxes, ha="center", color=_RED)
+    axes.margins(y=0.22)  # the words of the lines stand there
     axes.set_xlabel(_LABEL, color=_TEXT)
     axes.set_ylabel("runs", color=_TEXT)
     _dress(axes)

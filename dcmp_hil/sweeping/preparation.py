@@ -1,4 +1,4 @@
-"""Everything about a sweep that is found out before it starts: its rig, engines, time and bytes."""
+"""Facts of a sweep that are found out before it starts: its rig, engines, time and bytes."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ NUMERICS = 2
 
 
 class Progress(NamedTuple):
-    """How far a sweep is."""
+    """State of a sweep: runs that are finished."""
 
     runs: int
     """Runs that are finished."""

@@ -39,7 +39,7 @@ def main(parent: ParentProcess) -> None:
 
 
 def _read(channel: socket.socket, blocks: SimpleQueue[SweepBlock]) -> None:
-    """Pass on the blocks that come; end the process with its parent, whatever it is working at."""
+    """Pass on the blocks that come; end the process with its parent, also in the middle of a block."""
     while (data := receive_bytes(channel)) is not None:
         blocks.put(SweepBlock(*pickle.loads(data)))  # noqa: S301 - written by our own parent
     os._exit(0)

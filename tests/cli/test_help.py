@@ -87,7 +87,7 @@ def test_an_example_without_a_device_runs(cli: Callable[..., Outcome], example: 
     [
         (("rnu",), '"rnu" is no command. Did you mean "run"?'),
         (("replya", "x.csv"), '"replya" is no command. Did you mean "replay"?'),
-        (("xyzzy",), '"xyzzy" is no command. The commands: run, check, rigs, '),
+        (("xyzzy",), '"xyzzy" is no command. The commands: run, check, sweep, rigs, '),
         (("run", "--durration", "3"), "No such option: --durration. Did you mean --duration?"),
         (("run", "--xyzzy"), "No such option: --xyzzy. See `dcmp-hil run --help`."),
         (("run", "--viewer", "wbe"), "Invalid value for '--viewer': 'wbe' is not one of 'spawn', 'web', "),
