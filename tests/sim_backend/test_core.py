@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import shutil
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -17,10 +18,12 @@ from dcmp_hil.errors import OpenError
 from dcmp_hil.platform.clock import SimulatedClock
 from sim_backend import core_library
 from sim_backend.backend import SimBackend
+from sim_backend.compiling.build import sources
 from sim_backend.core_plant import CorePlant
 from sim_backend.engine import engine_of
 from sim_backend.hardware import CoreHardware, StagedHardware, make_hardware
 from sim_backend.plant import EulerPlant, MoreauPlant, make_plant
+from tests.firmware.core_library import WARNINGS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -226,3 +229,35 @@ def test_random_numbers_are_those_of_python() -> None:
     hardware.sample()
     normal = CountedRandom(7, 0).normal
     assert [hardware.read()[0] for _ in range(300)] == [normal(n) for n in range(1, 301)]
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="clang is not there")
+def test_clang_makes_a_library_with_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    overrides = "sim.encoder_noise_counts=0.7", "sim.lost_samples=0.1", "amplifier.slew_V_s=900"
+
+    def ride() -> list[object]:
+        hardware = make_hardware(_rig(*overrides), engine_of(_rig(*overrides)))
+        got: list[object] = []
+        for period in range(300):
+            got.append((hardware.sample(), hardware.truth()))
+            hardware.command(8.0 * math.sin(0.1 * period))
+        return got
+
+    found = ride()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("CC", "clang")
+    monkeypatch.setattr("sim_backend.hardware.load", core_library.load.__wrapped__)
+    assert str(ride()) == str(found)
+    assert list(tmp_path.rglob("*.so"))
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_library_compiles_without_a_warning(tmp_path: Path, name: str) -> None:
+    if shutil.which(name) is None:
+        pytest.skip(f"{name} is not there")
+    warnings = [flag for flag in WARNINGS if flag != "-ffreestanding"]
+    root = sources()
+    command = [name, *warnings, *core_library.TARGET.flags, "-O2", f"-I{root / 'core'}"]
+    subprocess.run(
+        [*command, str(root / "boards/simlib/simlib.c"), "-o", str(tmp_path / "made.so")], check=True
+    )
