@@ -96,14 +96,12 @@ static inline real dcmp_sim_encoder_read(struct dcmp_sim_encoder encoder, real p
 
 /* ------------------------------------------------------------------------------------------------------- amplifier */
 
-#define DCMP_SIM_DELAY_MAX 3
-
 struct dcmp_sim_amplifier {
     real limit;     /* V, either way */
     real slew;      /* V a period */
     real dead_zone; /* V, either way */
     real quantum;   /* V; 0 for none */
-    real delay;     /* periods from command to output: 0 to DCMP_SIM_DELAY_MAX */
+    real delay;     /* periods from command to output: 0 to 3 */
 };
 
 struct dcmp_sim_amplifier_state {
