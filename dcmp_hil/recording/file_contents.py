@@ -13,7 +13,19 @@ from dcmp_hil.ipc.ring import FIELDS
 from dcmp_hil.recording.mcap_records import Op, RecordError, counts_in, metadata_in
 from dcmp_hil.recording.mcap_scanner import Damage, attachment_of
 from dcmp_hil.recording.messages import Messages
-from dcmp_hil.recording.schema import ABOUT, CYCLES, END, EVENTS, FORMAT, FORMAT_1, FURTHER, RIG, RUN
+from dcmp_hil.recording.schema import (
+    ABOUT,
+    CYCLES,
+    END,
+    EVENTS,
+    FORMAT,
+    FORMAT_1,
+    FURTHER,
+    NUMERICS,
+    NUMERICS_1,
+    RIG,
+    RUN,
+)
 from dcmp_hil.telemetry.further_columns import fault_of
 
 if TYPE_CHECKING:
@@ -90,6 +102,13 @@ class FileContents:
             raise ConfigError(
                 f"{path}: a recording of format {run.get('format', 'unknown'):.20}; this version reads "
                 f"{FORMAT}. Use dcmp-hil {run.get('version', 'of that time'):.40}."
+            )
+        numerics = run.setdefault("numerics", NUMERICS_1)
+        if numerics not in {NUMERICS, NUMERICS_1}:
+            raise ConfigError(
+                f"{path}: a recording with numerics {numerics:.20}; this version computes by those of "
+                f"{NUMERICS_1} and {NUMERICS}. Use dcmp-hil {run.get('version', 'of that time'):.40}, or a "
+                "newer one."
             )
         return run
 

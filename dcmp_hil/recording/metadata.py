@@ -14,7 +14,7 @@ from dcmp_hil.common.printable_text import readable
 from dcmp_hil.config.plugin_check import names_a_class
 from dcmp_hil.platform.clock import utc_now
 from dcmp_hil.platform.host_info import host_facts
-from dcmp_hil.recording.schema import FORMAT
+from dcmp_hil.recording.schema import FORMAT, NUMERICS
 from dcmp_hil.wire.protocol_hash import PROTOCOL_HASH
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def about(rig: Rig, note: str = "", faults: Sequence[str] = (), folder: Path | N
     """
     known = {
         "format": FORMAT,
+        "numerics": NUMERICS,
         "version": __version__,
         "rig": rig.name,
         "began": utc_now().isoformat(timespec="milliseconds"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from dcmp_hil import loop
 from dcmp_hil.assembly import make_controller, make_friction, make_observer, make_predictor
+from dcmp_hil.control.numerics_1 import observer_1, predictor_1
 from dcmp_hil.control.references.table import Table
 from dcmp_hil.control.trajectory import Trajectory
 from dcmp_hil.errors import ConfigError
@@ -25,6 +26,7 @@ from dcmp_hil.recording.replay_backend import (
     ReplayBackend,
     ReplayTelemetry,
 )
+from dcmp_hil.recording.schema import NUMERICS_1
 from dcmp_hil.recording.untrusted import UnreadTable, check_numbers, refuse_named
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.outlier_filter import OutlierFilter
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dcmp_hil.config import Rig
+    from dcmp_hil.control.observers import Observer, Predictor
     from dcmp_hil.recording.reader import RecordedRun
     from dcmp_hil.recording.recorded_changes import UnrepeatedChange
     from dcmp_hil.values import Event
@@ -107,7 +110,7 @@ def _reexecute(
     recorded: RecordedRun, rig: Rig, trajectory: Trajectory, pinned: Collection[str]
 ) -> Reexecution:
     backend, outcomes = ReplayBackend(recorded.rows), ReplayTelemetry()
-    observer, controller = make_observer(rig), make_controller(rig)
+    (observer, predictor), controller = _observer(recorded, rig), make_controller(rig)
     mailbox = Mailbox()
     changes = LiveChanges(mailbox, trajectory, controller, observer, delay=rig.delay, notify=_ignore_event)
     found = changes_in(recorded.events, rig, pinned)
@@ -116,7 +119,7 @@ def _reexecute(
         backend=backend,
         outlier_filter=OutlierFilter(math.inf, rig.period, rig.encoder.count),  # outliers are missing already
         observer=observer,
-        predictor=make_predictor(rig, observer),
+        predictor=predictor,
         trajectory=RecordedTrajectory(backend, trajectory),
         controller=controller,
         supervisor=RecordedSupervisor(backend),
@@ -135,6 +138,16 @@ def _reexecute(
     )
     _check_own(again, observer, controller)
     return again
+
+
+def _observer(recorded: RecordedRun, rig: Rig) -> tuple[Observer, Predictor]:
+    """Make observer and predictor by the numerics of the recording."""
+    if recorded.run["numerics"] != NUMERICS_1:
+        observer = make_observer(rig)
+        return observer, make_predictor(rig, observer)
+    observer = observer_1(rig.observer, rig.observer_context) or make_observer(rig)
+    measured, context = rig.controller.position == "measured", rig.observer_context
+    return observer, predictor_1(observer, context, rig.loop.delay_samples, measured=measured)
 
 
 def _run(stages: loop.LoopStages, backend: ReplayBackend, lowered: Sequence[float]) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.control.elementary import expm1, sine
 
 # Roots of s^3 + 2 s^2 + (3/sqrt 2) s + 1.1, the continuous differentiator's own polynomial with
@@ -78,7 +77,7 @@ def matched_gains(x: float) -> ObserverGains:
     p1 = d + e1
     p3 = d * e0
     p2 = d * e1 + e0 - 0.5 * p3
-    return make(ObserverGains, (p1 - p2 + 0.5 * p3, p2 - p3, p3))  # 0.09 us less than the constructor
+    return ObserverGains(p1 - p2 + 0.5 * p3, p2 - p3, p3)
 
 
 _Pair = tuple[float, float]
