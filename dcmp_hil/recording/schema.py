@@ -22,8 +22,8 @@ FORMAT, FORMAT_1 = "2", "1"
 """Of what is said about a run; a number that this version does not know is refused. In format 1 an event had
 no kind, no data (see `recording.format_1`) and no number, and what is said of a run was under no checksum."""
 NUMERICS, NUMERICS_1 = "2", "1"
-"""Of the functions that observer and predictor are made of: a recording replays to the bit by those that it was
-made with. Where none is said it is 1 (see `control.numerics_1`); one that is not known here is refused."""
+"""Of the functions that observer and predictor are made of: a recording replays to the bit by those of its own.
+Where none is said it is 1 (see `control.numerics_1`); one that is not known here is refused."""
 CYCLES, EVENTS = "/cycles", "/events"
 RUN, ABOUT, RIG, END, FURTHER = "run", "run.json", "rig.json", "end.json", "further_columns.json"
 """Names of the metadata that say what the run was; of the attachments that say it under a checksum, of the
