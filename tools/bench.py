@@ -21,6 +21,7 @@ from dcmp_hil.control.observers.super_twisting import SuperTwisting
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.values import Cycle, Sample
 from tools.bench_core import core_ratios
+from tools.bench_lanes import BARS, LaneCosts, lane_costs
 from tools.bench_lateness import Lateness, lateness, period_us
 from tools.bench_observers import RATIO_MAX, observer_costs
 from tools.bench_telemetry import Endurance, endurance, record_us
@@ -175,6 +176,18 @@ def _observer_rows() -> list[Row]:
     ]
 
 
+def _lane_rows(found: LaneCosts) -> list[Row]:
+    """Rows of a sweep in lanes at one step of the plant."""
+    at = f"lanes ({found.instruction_set}), plant step {found.bars.step_us:g} us"
+    millions = [rate / 1e6 for rate in found.lanes_cycles_s]
+    ratio, sweep = found.goals
+    return [
+        _row_of(f"{at}: cycles a CPU-second", millions, "1e6", ""),
+        _row_of("ratio to the plain loop with the plant in Python", found.ratios, "x", ratio),
+        _row_of("CPU time of 10,000 runs of 30 s", found.sweep_s, "s", sweep),
+    ]
+
+
 def _wire_rows() -> list[Row]:
     """Round trips over a pseudo terminal: the ratio is of medians of the same run, taken in turn."""
     firmware, echo = round_trips()
@@ -236,6 +249,8 @@ def main() -> None:
     asked = parser.parse_args()
     target: Path = asked.json
     rows = _rows()
+    lanes = [lane_costs(bars) for bars in BARS]
+    rows += [row for found in lanes for row in _lane_rows(found)]
     for rate in (1000.0, 10_000.0):
         rows += _lateness_rows(lateness(rate, asked.rounds, asked.seconds))
     if asked.endurance > 0.0:
@@ -245,6 +260,7 @@ def main() -> None:
     write(f"{'':56}{'median':>10}{'min':>10}{'max':>10}  unit  goal\n")
     for row in rows:
         write(f"{row.what:56}{row.median:10.3f}{row.low:10.3f}{row.high:10.3f}  {row.unit:4}  {row.goal}\n")
+    write("\n" + "".join(f"{found.verdict}\n" for found in lanes))
     write(
         "\nthe figures at these plant steps (theory: tracking < .28 mrad, v < .0075, w < .28, TV 60 to 80)\n"
     )

@@ -57,7 +57,7 @@ def reference_rows(
     soft_start = reference.soft_start_s
     at = reference.source().at
     ahead = t + instants.delay
-    rows["x"], rows["v"], rows["a"] = np.array([at(one) for one in ahead.tolist()]).T
+    rows["x"], rows["v"], rows["a"] = zip(*map(at, ahead.tolist()), strict=True)
     _add_fade(rows, ahead, soft_start, ("fading", "gone", "gone1", "gone2"))
     if instants.now:
         rows["x_now"] = [at(one)[0] for one in t.tolist()]
@@ -67,7 +67,7 @@ def reference_rows(
     if instants.middle:
         before = np.maximum(np.array(ticks, float) - 1.0, 0.0) * instants.period
         middle = 0.5 * (t + before)
-        rows["x_middle"], rows["v_middle"], _ = np.array([at(one) for one in middle.tolist()]).T
+        rows["x_middle"], rows["v_middle"], _ = zip(*map(at, middle.tolist()), strict=True)
         _add_fade(rows, middle, soft_start, ("fading_middle", "gone_middle", "gone1_middle"))
     return rows
 
@@ -77,7 +77,9 @@ def _add_fade(
 ) -> None:
     """Add the weights of the soft start at instants `t`, s, under a flag and as many names as asked for."""
     flag, *weights = names
-    for k in np.flatnonzero(t < soft_start).tolist():
-        rows[flag][k] = 1.0
-        for name, weight in zip(weights, fade(float(t[k]), soft_start), strict=False):
-            rows[name][k] = weight
+    fading = t[t < soft_start].tolist()  # the first ones
+    rows[flag][: len(fading)] = 1.0
+    if fading:
+        columns = zip(*(fade(one, soft_start) for one in fading), strict=True)
+        for name, column in zip(weights, columns, strict=False):
+            rows[name][: len(fading)] = column
