@@ -71,9 +71,10 @@ class BlockWork:
     def rows(self, runs: Sequence[int], duration_s: float) -> list[RunRow]:
         """Return a row for each of some runs, each of them `duration_s` (s) long."""
         design, engines = SweepDesign(self.spec), self.engines()
-        rigs = variants(self.base, (design.named(run) for run in runs))
+        values = [design.values(run) for run in runs]
+        rigs = variants(self.base, (dict(zip(design.keys, one, strict=True)) for one in values))
         groups: dict[str, list[int]] = defaultdict(list)
-        found = [RunRow(run, design.values(run), "", "", NO_OUTCOME) for run in runs]
+        found = [RunRow(run, one, "", "", NO_OUTCOME) for run, one in zip(runs, values, strict=True)]
         for place, rig in enumerate(rigs):
             name, reasons = ("", (str(rig),)) if isinstance(rig, Refusal) else assigned(rig, engines)
             if name:

@@ -18,7 +18,7 @@ from dcmp_hil.fault_hooks import inject
 from dcmp_hil.platform.clock import cpu_ns
 from dcmp_hil.sweeping.block_work import BlockWork, assigned
 from dcmp_hil.sweeping.design import SweepDesign, override
-from dcmp_hil.sweeping.engine import PLAIN
+from dcmp_hil.sweeping.engine import LANES, PLAIN
 from dcmp_hil.sweeping.parts import PART_BYTES, ROW_BYTES, VALUE_BYTES, schema_of
 from dcmp_hil.sweeping.variants import Refusal, variants
 
@@ -32,6 +32,7 @@ _CHECKED_MAX = 1000  # values of a key of the grid
 _SAMPLED_RUNS = 128  # that are looked at for engines and refusals
 _TIMED_CPU_S = 0.1  # s of work after which the timing of an engine ends
 _TIMED_PLAIN_S = (0.25, 1.0)  # s of device time: its cost is a start and so much a second
+_LANES_TOGETHER = 64  # runs: fewer cost as much
 _BLOCK_CPU_S = 1.0
 _BLOCKS_PER_WORKER = 10
 _PARTS_MAX = 20_000
@@ -97,7 +98,10 @@ class PreparedSweep:
         runs = math.ceil(_BLOCK_CPU_S / self.cpu_s_per_run)
         if not together:
             runs = min(runs, math.ceil(total / (_BLOCKS_PER_WORKER * workers)))
-        return min(total, max(runs, math.ceil(total / _PARTS_MAX)))
+        runs = max(runs, math.ceil(total / _PARTS_MAX))
+        if any(one.engine == LANES for one in self.shares):
+            runs = _LANES_TOGETHER * math.ceil(runs / _LANES_TOGETHER)
+        return min(total, runs)
 
 
 def prepare(spec: SweepSpec, place: str, *, plain: bool = False) -> PreparedSweep:
@@ -227,7 +231,8 @@ def _cost(work: BlockWork, engine: str, numbers: Sequence[int]) -> float:
         short, long = (_timed(work, numbers[:1], seconds) for seconds in _TIMED_PLAIN_S)
         slope = max(0.0, long - short) / (_TIMED_PLAIN_S[1] - _TIMED_PLAIN_S[0])
         return long + slope * (length - _TIMED_PLAIN_S[1])
-    count, most = 1, len(numbers)
+    most = len(numbers)
+    count = 1 if engine == PLAIN else min(_LANES_TOGETHER, most)
     work.rows(numbers[:1], min(length, _TIMED_PLAIN_S[0]))  # compiles, or loads what is compiled
     while True:
         spent = _timed(work, numbers[:count], length)
