@@ -7,25 +7,26 @@ from __future__ import annotations
 
 import asyncio
 import pickle
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dcmp_hil.sweeping import cluster_worker
-from dcmp_hil.sweeping.cluster_address import host_and_port, require_listener
-from dcmp_hil.sweeping.cluster_errors import no_scheduler, other_versions, unusable_worker
+from dcmp_hil.sweeping.cluster_address import host_and_port
+from dcmp_hil.sweeping.cluster_connection import connected
+from dcmp_hil.sweeping.cluster_errors import other_versions, unusable_worker
 from dcmp_hil.sweeping.cluster_look import ClusterLook, ClusterTimeouts
 from dcmp_hil.sweeping.cluster_tasks import BlockTasks
 from dcmp_hil.sweeping.cluster_worker import Installed, installed
-from dcmp_hil.sweeping.dask_library import import_distributed, silent_log
+from dcmp_hil.sweeping.dask_library import import_distributed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from contextlib import AbstractContextManager
 
     from dcmp_hil.sweeping.executor import SweepBlock
 
 T = TypeVar("T")
 
-_CLOSE_S = 2.0
 _BLOCKS_PER_THREAD = 2  # one that runs, and one that waits beside it
 _TIMEOUTS = ClusterTimeouts()
 
@@ -92,22 +93,8 @@ class DaskCluster:
             while tasks.count:
                 yield tasks.next()
 
-    @contextmanager
-    def _connected(self) -> Iterator[Any]:
-        """Give a client of the scheduler; in the end the scheduler forgets what has not begun."""
-        require_listener(self._address, self._timeouts.connect_s)
-        with silent_log():
-            try:
-                client = self._distributed.Client(
-                    self._address, timeout=self._timeouts.connect_s, set_as_default=False
-                )
-            except (OSError, TypeError, ValueError, RuntimeError) as error:
-                raise no_scheduler(self._address, error) from error
-            try:
-                yield client
-            finally:
-                with suppress(OSError, RuntimeError, AssertionError):  # the scheduler may have gone before
-                    client.close(timeout=_CLOSE_S)
+    def _connected(self) -> AbstractContextManager[Any]:
+        return connected(self._distributed, self._address, self._timeouts.connect_s)
 
 
 def _ask_each(client: Any, workers: Iterable[str], answer_s: float) -> list[tuple[str, Any]]:

@@ -18,7 +18,8 @@ def no_scheduler(address: str, error: BaseException) -> OpenError:
     """Return that what listens at an address cannot be talked to as a scheduler."""
     return OpenError(
         f"What listens at {address} does not answer as a Dask scheduler ({_text(error)}): see that the port "
-        f"is the scheduler's, and that tls:// is written exactly if it uses TLS. {_CONSISTENT}."
+        "is the scheduler's, and that tls:// is written exactly if it uses TLS (Dask's configuration names the "
+        f"certificates). {_CONSISTENT}."
     )
 
 
@@ -89,6 +90,8 @@ def failed_block(block: SweepBlock, error: BaseException) -> BackendError:
 
 def _text(error: BaseException) -> str:
     """Return an error in one line of at most 200 characters."""
+    if isinstance(error, TimeoutError) and not error.args:
+        return "no answer in time"
     words = " ".join(str(error).split())
     name = type(error).__name__
     return (f"{name}: {words}" if words else name)[:200]
