@@ -10,6 +10,9 @@ from __future__ import annotations
 
 from math import frexp, ldexp
 
+NUMERICS = 2
+"""Version of the arithmetic: results of the same version are the same to the bit on every computer."""
+
 _ROUNDING = 6755399441055744.0  # 1.5 * 2**52: a sum with it has no bits left for a fraction
 _WHOLE = 2251799813685248.0  # 2**51: from here on the sum with it is not exact
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter
 
 from dcmp_hil.common.printable_text import readable
+from dcmp_hil.control import elementary
 from dcmp_hil.telemetry.further_columns import CHANNEL_NAMES, FURTHER_MAX, fault_of
 from dcmp_hil.values import DATA, OPTIONAL_DATA, Event, EventKind, Level
 
@@ -21,8 +22,8 @@ PROFILE, LIBRARY = "ros2", "dcmp-hil"
 FORMAT, FORMAT_1 = "2", "1"
 """Of what is said about a run; a number that this version does not know is refused. In format 1 an event had
 no kind, no data (see `recording.format_1`) and no number, and what is said of a run was under no checksum."""
-NUMERICS, NUMERICS_1 = "2", "1"
-"""Of the functions that observer and predictor are made of: a recording replays to the bit by those of its own.
+NUMERICS, NUMERICS_1 = str(elementary.NUMERICS), "1"
+"""Of the functions that observer and predictor are made of: a recording replays to the bit by its own.
 Where none is said it is 1 (see `control.numerics_1`); one that is not known here is refused."""
 CYCLES, EVENTS = "/cycles", "/events"
 RUN, ABOUT, RIG, END, FURTHER = "run", "run.json", "rig.json", "end.json", "further_columns.json"

@@ -18,8 +18,8 @@ def no_scheduler(address: str, error: BaseException) -> OpenError:
     """Return that what listens at an address cannot be talked to as a scheduler."""
     return OpenError(
         f"What listens at {address} does not answer as a Dask scheduler ({_text(error)}): see that the port "
-        "is the scheduler's, and that tls:// is written exactly if it uses TLS (Dask's configuration names the "
-        f"certificates). {_CONSISTENT}."
+        "is the scheduler's, and that tls:// is written exactly if it uses TLS (Dask's configuration names "
+        f"the certificates). {_CONSISTENT}."
     )
 
 

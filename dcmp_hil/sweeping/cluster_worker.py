@@ -11,13 +11,12 @@ import threading
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import dcmp_hil
+from dcmp_hil.control.elementary import NUMERICS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.sweeping.executor import SweepBlock
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-_NUMERICS = 2
 
 
 class Installed(NamedTuple):
@@ -58,7 +57,7 @@ _latest = _Latest()
 
 def installed() -> Installed:
     """Return the versions of this computer."""
-    return Installed(dcmp_hil.__version__, _NUMERICS)
+    return Installed(dcmp_hil.__version__, NUMERICS)
 
 
 def run_block(wanted: tuple[str, int], work: bytes, block: tuple[int, int, int]) -> tuple[Any, ...]:

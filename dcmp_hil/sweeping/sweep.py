@@ -6,6 +6,7 @@ import errno
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from dcmp_hil.control.elementary import NUMERICS
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.platform.disk_space import room_for
 from dcmp_hil.sweeping.executor import SweepBlock
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from dcmp_hil.sweeping.block_work import RunRow
     from dcmp_hil.sweeping.executor import Executor
     from dcmp_hil.sweeping.preparation import PreparedSweep
-
-NUMERICS = 2
-"""Version of the arithmetic: parts of different ones are not put together."""
 
 
 class Progress(NamedTuple):
