@@ -15,7 +15,7 @@ from tools.mutants.trials import Verdict, verdicts
 if TYPE_CHECKING:
     from pathlib import Path
 
-TESTS = [str(HERE / "core" / "test_watchdog.py")]
+TESTS = [str(HERE / "core" / f"test_{name}.py") for name in ("watchdog", "elementary")]
 
 
 def made(file: str, old: str, new: str) -> Mutant:
@@ -31,6 +31,9 @@ BY_HAND = {
     "bool dcmp_watchdog_expired(": ("dcmp_watchdog.c", "bool dcmp_watchdog_expired(;", "dropped"),
     "watchdog->fed_us = now_us;": ("dcmp_watchdog.c", "watchdog->fed_us = now_us + 0;", "dropped"),
     "ttl_ms < watchdog_ms": ("dcmp_watchdog.c", "ttl_ms <= watchdog_ms", "survived"),
+    "n > x ? below : n": ("dcmp_elementary.h", "n >= x ? below : n", "tests"),
+    "const real none = x - x;": ("dcmp_elementary.h", "const real none = (x - x);", "dropped"),
+    "DCMP_PI_3 REAL(1.984187159361081e-09)": ("dcmp_real.h", "DCMP_PI_3 REAL(1e-04)", "tests"),
     ">= DCMP_LEASE_US": ("dcmp_session.c", "> DCMP_LEASE_US", "survived"),  # test_sessions.py is not asked
 }
 
@@ -112,6 +115,47 @@ int f(int a, int b)
     return a + b;
 }
 """
+
+
+HEADER = """\
+#ifndef SMALL_H
+#define SMALL_H
+#if defined(A) && A != 1
+#error "no 7 here"
+#endif
+#ifdef SINGLE
+#define MOST REAL(2.5) /* of 4.5 */
+#else
+#define MOST REAL(0x1p-3)
+#endif
+static inline real f(real x)
+{
+    return x * 1e-05 + REAL(0.0) > 1.0 ? -x : MOST;
+}
+#endif
+"""
+
+
+def test_mutants_of_a_header(tmp_path: Path) -> None:
+    (tmp_path / "small.h").write_text(HEADER, "utf-8")
+    found = [
+        each
+        for each in mutants(tmp_path / "small.h")
+        if each.row in (3, 4, 7, 9) or "x * 1e-05 +" in each.line
+    ]
+    numbers = {each.becomes for each in found if each.row == 13}
+    assert {each.becomes for each in found if each.row != 13} == {
+        "#define MOST REAL(2.5025)",
+        "#define MOST REAL(0.125125)",
+    }
+    assert {each.where for each in found} == {"MOST", "f"}
+    for text in (
+        "x * 1.001e-05 + REAL(0.0) > 1.0",
+        "x * 1e-05 + REAL(1.0) > 1.0",
+        "REAL(0.0) > 2.0",
+        "REAL(0.0) > 0.0",
+    ):
+        assert any(text in number for number in numbers), text
 
 
 def test_mutants_of_every_kind(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.firmware.core_library import APP, CORE, HERE, ROOT
+from tests.firmware.core_library import APP, CORE, HERE, ROOT, law_headers
 from tools.mutants.generate import mutants
 from tools.mutants.report import complaints, names, page, table
 from tools.mutants.trials import verdicts
@@ -20,7 +20,7 @@ _CORE = ("watchdog", "supervisor", "guard", "amplifier", "session", "health", "d
 _APP = ("life", "app", "record", "boot_count", "fault_log", "ring")
 FILES = [CORE / f"dcmp_{name}.c" for name in (*_CORE, "history", "parameters")]
 FILES += [APP / f"{name}.c" for name in _APP]
-FILES += [CORE / f"dcmp_{name}.h" for name in ("real", "elementary", "control", "friction_kalman")]
+FILES += [CORE / "dcmp_real.h", *law_headers()]
 NAMES = HERE / "mutants.toml"
 
 

@@ -139,7 +139,7 @@ def _other_fractions(text: str) -> list[str]:
     value = float.fromhex(text) if text[:2] in ("0x", "0X") else float(text)
     if value == 0.0:
         return ["1.0"]
-    return ["0.0", "2.0"] if value == 1.0 else [repr(1.001 * value)]
+    return ["0.0", "2.0"] if value == 1.0 else [f"{1.001 * value:.6g}"]
 
 
 def _truth(node: Node) -> Iterator[Change]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tests.firmware.core_library import HERE, ROOT
+from tests.firmware.core_library import HERE, ROOT, law_headers
 from tools.mutants.compiling import Workshop
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ _STATE = (
     *("memory", "sessions", "supervisor", "watchdog"),
 )
 _AROUND = ("app", "boot_count", "latched", "parameters", "records", "reports", "rings")
-_LAW = ("elementary", "control", "friction_kalman")
-TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in _STATE + _AROUND + _LAW)
+_LAW = [header.stem.removeprefix("dcmp_") for header in law_headers()]
+TESTS = tuple(str(HERE / "core" / f"test_{name}.py") for name in (*_STATE, *_AROUND, *_LAW))
 """Those of what is mutated: checksums, messages and byte streams are not."""
 
 SINGLE = {"OPENBLAS_NUM_THREADS": "1"}
