@@ -11,9 +11,11 @@ from pydantic import BaseModel
 from dcmp_hil.config.formatting import describe, toml_value
 from dcmp_hil.config.rig import KINDS, Rig
 from dcmp_hil.config.schema import rig_schema
+from dcmp_hil.sweeping.schema import sweep_schema
 
 _ROOT = Path(__file__).parent.parent
 SCHEMA = _ROOT / "dcmp_hil/rigs/rig.schema.json"
+SWEEP_SCHEMA = _ROOT / "dcmp_hil/sweeping/sweep.schema.json"
 PAGE = _ROOT / "docs/rig.md"
 
 _INTRO = """# rig.toml, every key
@@ -28,6 +30,11 @@ from, with a JSON Schema beside it. A relative `reference.file` starts from the 
 def schema_text() -> str:
     """Return the JSON Schema of rig.toml, for editors."""
     return json.dumps(rig_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def sweep_schema_text() -> str:
+    """Return the JSON Schema of a sweep's file, for editors."""
+    return json.dumps(sweep_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def page_text() -> str:
@@ -68,8 +75,12 @@ def _rows_of(model: type[BaseModel], names: list[str]) -> str:
 
 
 def main() -> None:
-    """Write both files."""
-    for path, text in ((SCHEMA, schema_text()), (PAGE, page_text())):
+    """Write the schemas and the page."""
+    for path, text in (
+        (SCHEMA, schema_text()),
+        (SWEEP_SCHEMA, sweep_schema_text()),
+        (PAGE, page_text()),
+    ):
         path.write_text(text, encoding="utf-8")
         sys.stdout.write(f"wrote {path.relative_to(_ROOT)}\n")
 

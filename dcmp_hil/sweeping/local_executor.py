@@ -69,7 +69,7 @@ class Processes:
         try:
             while waiting or busy:
                 while waiting and len(busy) < self.workers:
-                    _give(_Worker(work), *waiting.popleft(), busy)
+                    self._give(_Worker(work), *waiting.popleft(), busy)
                 for descriptor in select.select(list(busy), [], [])[0]:
                     worker = busy.pop(descriptor)
                     answer = worker.answer()
@@ -77,13 +77,21 @@ class Processes:
                         waiting.appendleft((worker.block, _again(worker)))
                         continue
                     if waiting:
-                        _give(worker, *waiting.popleft(), busy)
+                        self._give(worker, *waiting.popleft(), busy)
                     else:
                         worker.end()
                     yield worker.answered, _result(answer)
         finally:
             for worker in busy.values():
                 worker.end()
+
+    def started(self, pid: int, block: SweepBlock, trial: int) -> None:
+        """Do nothing: a process has been given a block, for the first time or again."""
+
+    def _give(self, worker: _Worker, block: SweepBlock, trial: int, busy: dict[int, _Worker]) -> None:
+        busy[worker.descriptor] = worker
+        worker.start(block, trial)
+        self.started(worker.pid, block, trial)
 
 
 class _Worker:
@@ -101,7 +109,7 @@ class _Worker:
                 f"No process could be started for the sweep ({error.strerror}). End other programs, or take "
                 "--workers 1."
             ) from None
-        self.descriptor = self._child.channel.fileno()
+        self.descriptor, self.pid = self._child.channel.fileno(), self._child.pid
 
     def start(self, block: SweepBlock, trial: int) -> None:
         """Send a block to the process."""
@@ -130,11 +138,6 @@ class _Worker:
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _give(worker: _Worker, block: SweepBlock, trial: int, busy: dict[int, _Worker]) -> None:
-    busy[worker.descriptor] = worker
-    worker.start(block, trial)
 
 
 def _again(worker: _Worker) -> int:

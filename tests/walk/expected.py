@@ -42,6 +42,10 @@ _SAYS: Mapping[str, tuple[str, ...]] = {
     "check": (r"wrote \S+", r"\S+ says so already"),
     "rigs": (r"wrote \S+", r".*copy.*"),
     "paper": (r"wrote \S+", r"no picture: .*"),
+    "sweep": (
+        *(r"engine: .*", r"\d+ of \d+ runs.*", r"wrote \S+sweep\.png: .*", r"results in .*"),
+        r"looking at the rig, and timing .*",
+    ),
     "view": (r"web viewer: http://127\.0\.0\.1:\d+\?url=\S+",),
     "device": (r"dcmp-hil run .*",),
     "panel": (r"Ctrl-C ends the page; .*", r"warning: No web viewer .*"),
@@ -103,7 +107,8 @@ def _check_files(command: str, chosen: Mapping[str, tuple[str, ...]], folder: Pa
     if chosen.get("--list"):  # ends before any check
         return
     for option, words in chosen.items():
-        if option == "--out" and chosen["--no-figures"]:  # a folder for nothing is not made
+        nothing = chosen.get("--no-figures") or chosen.get("--dry-run")
+        if option == "--out" and nothing:  # a folder for nothing is not made
             continue
         for word in words[1:]:
             if str(folder) in word and command != "device":

@@ -46,6 +46,13 @@ VALUES: Mapping[str, Mapping[str, tuple[Value, ...]]] = {
         "--compare": given("--compare", "friction_kalman,derivative"),
     },
     "check": {"RIG": (("bench-1khz",), ("{rig}",)), "--set": given("--set", "loop.rate_hz=500")},
+    "sweep": {
+        "SPEC": (("{sweep}",),),
+        "--out": (("--out", "{folder}/results"),),
+        "--workers": given("--workers", "1"),
+        "--scheduler": (OUT,),
+        "--json": given("--json", "{folder}/figures.json", "-"),
+    },
     "paper": {
         "--out": given("--out", "{folder}/figures"),
         "--json": given("--json", "{folder}/figures.json", "-"),

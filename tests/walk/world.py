@@ -53,6 +53,13 @@ class World:
         return self._folder / "own.toml"
 
     @cached_property
+    def sweep(self) -> Path:
+        """The file of a sweep of two short runs."""
+        place = self._folder / "two.toml"
+        place.write_text('rig = "bench-1khz"\nduration_s = 0.6\nruns = 2\n', "utf-8")
+        return place
+
+    @cached_property
     def recording(self) -> Path:
         """A run's own recording."""
         self._call("run", "--fast", "--duration", "1", "--viewer", "none")
