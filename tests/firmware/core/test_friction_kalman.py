@@ -116,6 +116,10 @@ RIDES: dict[str, tuple[list[Sample], Settings]] = {
     "wrong counts": (_wiped(QUIET), Settings()),
     "wrong friction": (QUIET, Settings(f1=0.2)),
     "at rest": (RESTING, Settings()),
+    "far away": (
+        [*QUIET[:300], *(s._replace(position=s.position + 1e13) for s in QUIET[300:350])],
+        Settings(),
+    ),
     "no position": (_spoilt(QUIET, "position"), Settings()),
     "no voltage": (_spoilt(QUIET, "voltage"), Settings()),
 }
@@ -125,6 +129,14 @@ WANTED = {name: in_python(*given) for name, given in RIDES.items()}
 @pytest.mark.parametrize("name", RIDES)
 def test_filter_and_prediction_have_the_bits_of_python(core: Core, name: str) -> None:
     assert same_bits(in_c(Law(core), *RIDES[name]), WANTED[name])
+
+
+def test_time_that_does_not_advance_is_a_new_start(core: Core) -> None:
+    samples = [*QUIET[:50], QUIET[49]._replace(position=0.25), QUIET[3]._replace(position=0.5)]
+    got = in_c(Law(core), samples, Settings())
+    first = in_c(Law(core), [Sample(0.0, 0.25, 0.0)], Settings(delay=0))
+    assert same_bits(got[50, :31], first[0, :31])
+    assert got[51, :3].tolist() == [0.5, 0.0, 0.0]
 
 
 def test_rides_reach_what_they_are_for() -> None:
