@@ -20,6 +20,7 @@ _LONG = ("tests/stateful/", "tests/socketcan/", "tests/target/", "tests/firmware
 _SLOW = (
     *_LONG,
     *(f"tests/{name}/" for name in ("attacks", "conformance", "faults", "install", "panel", "walk")),
+    "tests/sweeping/test_cluster",
 )
 
 # Between the look for a free port and its use another worker could take it.

@@ -66,8 +66,8 @@ class DaskCluster:
         """Place where the blocks run."""
         count, threads = len(self._threads), self.workers
         return (
-            f"the Dask cluster at {self._address}: {count} worker{'s' * (count != 1)}, {threads} "
-            f"thread{'s' * (threads != 1)}"
+            f"{threads} thread{'s' * (threads != 1)} of {count} worker{'s' * (count != 1)} "
+            f"of Dask at {self._address}"
         )
 
     @property
