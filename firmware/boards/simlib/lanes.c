@@ -13,8 +13,8 @@
 /* Take the constants of an observer's step from those of every length. */
 static void take_step(struct lanes_observer *o, const double *numbers, int l)
 {
-    o->f12[l] = numbers[0 * DCMP_LANES + l];
-    o->f22[l] = numbers[1 * DCMP_LANES + l];
+    o->f12[l] = numbers[l];
+    o->f22[l] = numbers[DCMP_LANES + l];
     o->gu1[l] = numbers[2 * DCMP_LANES + l];
     o->gu2[l] = numbers[3 * DCMP_LANES + l];
     o->h01[l] = numbers[4 * DCMP_LANES + l];
@@ -57,7 +57,7 @@ static inline bool sample(const struct lanes_common *common, struct lanes_block 
     struct lanes_state *s = &block->state;
     const struct lanes_parameters *p = &block->parameters;
     for (int l = 0; l < DCMP_LANES; l++) {
-        c->take[l] = s->phase[l] != (double)LANES_OVER ? 1 : 0;
+        c->take[l] = s->phase[l] != (double)LANES_OVER ? INT64_C(1) : INT64_C(0);
         c->flags[l] = 0;
         c->applied[l] = 0.0;
         c->dt[l] = c->t - s->t[l];
@@ -112,8 +112,7 @@ static inline bool supervise(const struct lanes_common *common, struct lanes_blo
                              bool restart)
 {
     struct lanes_state *s = &block->state;
-    double position[DCMP_LANES];
-    const struct lanes_estimates seen = {position, c->watch_x2, c->watch_w};
+    const struct lanes_estimates seen = {c->watch_x1, c->watch_x2, c->watch_w};
     lanes_check_numbers(c);
     if (common->watched != 0) {
         lanes_observe(&block->watch, block->parameters.ku, c, c->applied, seen);

@@ -39,7 +39,8 @@ struct lanes_cycle {
     double x1[DCMP_LANES];      /* the estimate */
     double x2[DCMP_LANES];
     double w[DCMP_LANES];
-    double watch_x2[DCMP_LANES]; /* of the watch */
+    double watch_x1[DCMP_LANES]; /* that of the watch */
+    double watch_x2[DCMP_LANES];
     double watch_w[DCMP_LANES];
     double x[DCMP_LANES]; /* the reference at t + delay */
     double v[DCMP_LANES];

@@ -35,7 +35,7 @@ static inline void lanes_keep_state(struct lanes_observer *o, struct dcmp_super_
 }
 
 struct lanes_estimates {
-    double *x1; /* null where it is not asked for */
+    double *x1;
     double *x2;
     double *w;
 };

@@ -60,7 +60,8 @@ static inline void lanes_move(const struct lanes_common *common, const struct la
                               struct lanes_state *restrict s, const double *restrict applied, int64_t tick)
 {
     double held[DCMP_LANES];
-    const double steps = (double)((tick - 1) * common->plant_steps);
+    const int64_t begun = (tick - 1) * common->plant_steps;
+    const double steps = (double)begun;
     for (int l = 0; l < DCMP_LANES; l++) {
         held[l] = dcmp_plant_held(lanes_plant_model(p, l), steps * p->plant_step[l], applied[l]);
     }

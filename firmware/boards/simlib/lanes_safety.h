@@ -19,7 +19,7 @@ static inline void lanes_filter(const struct lanes_parameters *restrict p, const
         const double moved = dcmp_magnitude(c->y[l] - o->y[l]);
         const double way = p->jump_speed[l] * c->dt[l];
         const double allowed = way > p->jump_floor[l] ? way : p->jump_floor[l];
-        const int64_t off = allowed < moved && moved < LANES_INFINITE ? LANES_FLAG_REPEAT : 0;
+        const int64_t off = allowed < moved ? LANES_FLAG_REPEAT : 0;
         c->flags[l] |= moved <= p->jump_usual[l] ? 0 : off;
     }
 }
@@ -209,6 +209,8 @@ static inline void lanes_decide(const struct lanes_common *common, struct lanes_
                 s->phase[l] = (double)LANES_STOPPING;
                 s->stop_since[l] = c->t;
                 s->stop_from[l] = dcmp_magnitude(c->voltage[l]);
+            } else {
+                /* A block is over, and its variation is usual. */
             }
         }
     }

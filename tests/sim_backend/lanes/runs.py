@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 CASES: dict[str, tuple[str, ...]] = {
     "nominal": (),
-    "saturated": ("amplifier.voltage_limit_V=3.2", "amplifier.slew_V_s=400"),
+    "saturated": ("amplifier.voltage_limit_V=3.2", "amplifier.slew_V_s=60"),
     "lost samples": ("sim.lost_samples=0.1",),
     "1024 counts": ("encoder.counts_per_rev=1024",),
     "65536 counts": ("encoder.counts_per_rev=65536",),
@@ -52,6 +52,17 @@ TRIPS: dict[str, tuple[tuple[str, ...], set[str]]] = {
     "noisy": (("sim.encoder_noise_counts=9", "supervisor.disturbance_limit_rad_s2=5000"), {"chatter"}),
 }
 """Overrides of runs that the supervisor ends, and why."""
+
+REPEATED: dict[str, tuple[str, ...]] = {
+    "led": (
+        "reference.kind=step",
+        "reference.at_s=0.2",
+        "reference.after_rad=2.5",
+        "reference.soft_start_s=0.1",
+    ),
+    "jumping": ("sim.encoder_noise_counts=150", "supervisor.disturbance_limit_rad_s2=1e5"),
+}
+"""Overrides of runs that lanes leave to the plain loop."""
 
 
 def rig_of(*overrides: str) -> Rig:

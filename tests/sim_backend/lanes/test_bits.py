@@ -14,7 +14,8 @@ from sim_backend.compiling import build
 from sim_backend.lanes import engine, library
 from sim_backend.lanes.engine import LaneEngine
 from sim_backend.lanes.instruction_sets import SETS, here
-from tests.sim_backend.lanes.runs import CASES, TRIPS, drawn, rig_of, unequal
+from tests.sim_backend.lanes.mixed import MIXED_S, mixed
+from tests.sim_backend.lanes.runs import CASES, REPEATED, TRIPS, drawn, unequal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from sim_backend.lanes.library import Lanes
 
 _PROMISED = {"nominal", "saturated", "lost samples", "1024 counts", "65536 counts", "ideal encoder"}
-_MIXED_S = 0.4
 
 
 @pytest.fixture
@@ -61,20 +61,14 @@ def test_a_lane_trips_as_the_plain_loop_does(name: str) -> None:
     assert not unequal(LaneEngine(), rigs, 2.2)
 
 
-def _mixed() -> list[Rig]:
-    """Return rigs of several groups, with more than one block of one, and with trips."""
-    overrides = [*CASES.values(), *(chosen for chosen, _ in TRIPS.values())]
-    return [*drawn(9, ()), *(rig for k, chosen in enumerate(overrides) for rig in drawn(2, chosen, k))]
-
-
 @pytest.fixture(scope="module")
 def expected() -> list[str]:
     """Return the outcomes of the mixed rigs by the usual build."""
-    return [repr(outcome) for outcome in LaneEngine().run(_mixed(), _MIXED_S)]
+    return [repr(outcome) for outcome in LaneEngine().run(mixed(), MIXED_S)]
 
 
 def _outcomes(load: partial[Lanes], threads: int = 1) -> list[str]:
-    return [repr(outcome) for outcome in LaneEngine(threads, load).run(_mixed(), _MIXED_S)]
+    return [repr(outcome) for outcome in LaneEngine(threads, load).run(mixed(), MIXED_S)]
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
@@ -105,14 +99,9 @@ def test_bits_do_not_depend_on_threads(expected: list[str]) -> None:
     assert _outcomes(partial(library.load), threads=2) == expected
 
 
-def test_a_reference_that_must_be_led_is_for_the_plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    step = (
-        "reference.kind=step",
-        "reference.at_s=0.2",
-        "reference.after_rad=2.5",
-        "reference.soft_start_s=0.1",
-    )
-    rigs = [rig_of(*step), *drawn(1, ())]
+@pytest.mark.parametrize("name", REPEATED)
+def test_some_runs_are_repeated_by_the_plain_loop(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rigs = [*drawn(1, REPEATED[name]), *drawn(1, ())]
     repeated: list[int] = []
 
     class _Counted(PlainLoop):
