@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -139,3 +143,30 @@ def test_without_a_compiler_the_plain_loop_takes_over_and_says_so(
     assert outcome.code == 0, outcome.err
     assert "engine: the plain loop, in this process: " in outcome.err
     assert "compiler" in outcome.err
+
+
+def test_a_real_sweep_is_interrupted_killed_and_continues_to_the_same_bits(tmp_path: Path) -> None:
+    place = written(tmp_path, TEXT.replace("runs = 4", "runs = 40").replace("0.2", "0.4"))
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "dcmp_hil", "sweep", str(place), "--out", str(out), "--plain"]
+
+    def until_there_are_more_parts() -> subprocess.Popen[str]:
+        before = len(list(out.glob("part-*")))
+        process = subprocess.Popen(
+            [*command, "--workers", "2"], stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        while process.poll() is None and len(list(out.glob("part-*"))) == before:
+            time.sleep(0.01)
+        return process
+
+    interrupted = until_there_are_more_parts()
+    os.killpg(interrupted.pid, signal.SIGINT)
+    _, said = interrupted.communicate()
+    assert (interrupted.returncode, said.count("interrupted: ")) == (130, 1), said
+    assert "of 40 runs are kept" in said.splitlines()[-1]
+    killed = until_there_are_more_parts()
+    killed.kill()
+    killed.communicate()  # ends when its workers have closed standard error
+    assert 0 < len(list(out.glob("part-*"))) < 20
+    found = sweep(place, out=out, plain=True)
+    assert str(found.table.to_pylist()) == str(sweep(place, plain=True).table.to_pylist())
