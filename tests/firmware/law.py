@@ -80,7 +80,7 @@ def reference(t: float) -> Reference:
     return Reference(s, 2.0 * c, -4.0 * s)
 
 
-def ride(counts: float | None = COUNTS, periods: int = 4000, push: float = 0.0) -> list[Sample]:
+def ride(counts: float | None = COUNTS, periods: int = 2500, push: float = 0.0) -> list[Sample]:
     """Return the samples of a closed loop: R1, predictor and controller of Python on the simulated plant.
 
     Parameters
