@@ -37,7 +37,7 @@ class SweepProgress:
             expand=True,
             disable=not console.err.is_terminal,
         )
-        self._task = self._bar.add_task("", total=None)
+        self._task = self._bar.add_task("", total=1.0)
         self._clock = MonotonicClock()
         self._began_ns = 0
         self._runs = self._total = self._lines = 0
@@ -51,9 +51,8 @@ class SweepProgress:
         )
 
     def __enter__(self) -> Self:
-        """Show the bar."""
+        """Make room for the bar, which appears with the first state."""
         console.take_width(console.err)
-        self._bar.start()
         return self
 
     def __exit__(
@@ -72,6 +71,7 @@ class SweepProgress:
         seconds = 1e-9 * (self._clock.now_ns() - self._began_ns)
         told = speed_and_rest(state.runs - state.found, total - state.found, seconds)
         self._bar.update(self._task, completed=state.runs, total=total, description=told)
+        self._bar.start()
         line = _LINES * (state.runs - state.found) // max(1, total - state.found)
         if not console.err.is_terminal and line > self._lines:
             self._lines = line

@@ -88,11 +88,15 @@ class BlockWork:
         return found
 
     def engines(self) -> dict[str, SweepEngine]:
-        """Return the engines that may be used, the fastest first."""
-        found: dict[str, SweepEngine] = {}
-        if not self.spec.faults and not self.plain:
-            found[LANES] = _lanes()
-        return {**found, PLAIN: PlainLoop(self.spec.faults)}
+        """Return the engines, the fastest first; one that must not be used refuses every rig."""
+        lanes: SweepEngine
+        if self.spec.faults:
+            lanes = NoEngine("Faults are injected, which lanes do not have.")
+        elif self.plain:
+            lanes = NoEngine("--plain asks for it.")
+        else:
+            lanes = _lanes()
+        return {LANES: lanes, PLAIN: PlainLoop(self.spec.faults)}
 
 
 def assigned(rig: Rig, engines: Mapping[str, SweepEngine]) -> Assignment:
@@ -107,12 +111,20 @@ def assigned(rig: Rig, engines: Mapping[str, SweepEngine]) -> Assignment:
 
 
 class NoEngine:
-    """Stands for an engine that this installation lacks."""
+    """Stands for an engine that cannot be used.
 
-    @staticmethod
-    def refusal(_: Rig) -> str:
-        """Return that it is not there."""
-        return "The lanes in C are not part of this installation."
+    Parameters
+    ----------
+    sentence
+        Why.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        self._sentence = sentence
+
+    def refusal(self, _: Rig) -> str:
+        """Return why."""
+        return self._sentence
 
     @staticmethod
     def run(rigs: Sequence[Rig], duration_s: float) -> list[RunOutcome]:
@@ -124,5 +136,5 @@ def _lanes() -> SweepEngine:
     try:
         made: SweepEngine = find_named(ENGINES[LANES], f"engine {LANES}")()
     except ConfigError:
-        return NoEngine()
+        return NoEngine("The lanes in C are not part of this installation.")
     return made

@@ -61,6 +61,8 @@ def test_values_that_the_rules_refuse_are_rows_with_the_sentence() -> None:
 def test_faults_go_to_the_plain_loop() -> None:
     result = sweep({**SMALL, "faults": ["plant.shove:at=100ms,for=10ms"], "grid": {}, "runs": 1})
     assert result.table.column("engine").to_pylist() == ["plain"]
+    (share,) = prepare(spec(faults=["plant.shove:at=100ms"]), "spec").shares
+    assert share.reasons == ("Faults are injected, which lanes do not have.",)
     assert "--fault plant.shove:at=100ms,for=10ms" in result.command(0)
 
 
