@@ -9,7 +9,7 @@ from dcmp_hil.sweeping.plain_loop import PlainLoop
 from sim_backend.lanes import refusal
 from sim_backend.lanes.block_group import GroupKey, Mode, key_of
 from sim_backend.lanes.group_run import run_group
-from sim_backend.lanes.library import LANES, load
+from sim_backend.lanes.library import LANES, load, load_single
 from sim_backend.lanes.outcome import DISTURBANCE, likely_cause, outcomes_of, samples_kept
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from sim_backend.lanes.group_run import GroupResult
     from sim_backend.lanes.library import Lanes
 
+_ALONE_MAX = 2  # runs of a group, for which a block of many lanes is slower than one lane
+_APART_MIN = 64  # such runs, for which one more library is compiled
 _BY_LOOP, _WITH_EXACT = 1.0, 2.0  # how a run has to be repeated: lanes.h
 
 
@@ -35,10 +37,17 @@ class LaneEngine:
         Blocks of lanes that run at the same time.
     library
         Loads the lanes; it may raise OpenError, which is a refusal.
+    single
+        Loads a library of one lane, for many runs that have nothing in common.
     """
 
-    def __init__(self, threads: int = 1, library: Callable[[], Lanes] = load) -> None:
-        self._threads, self._library = threads, library
+    def __init__(
+        self,
+        threads: int = 1,
+        library: Callable[[], Lanes] = load,
+        single: Callable[[], Lanes] = load_single,
+    ) -> None:
+        self._threads, self._library, self._single = threads, library, single
         self._lanes: Lanes | None = None
         self._fault = ""
 
@@ -58,12 +67,16 @@ class LaneEngine:
         for number, rig in enumerate(rigs):
             groups.setdefault(key_of(rig), []).append(number)
         found: dict[int, RunOutcome] = {}
+        apart = sum(len(numbers) for numbers in groups.values() if len(numbers) <= _ALONE_MAX)
         for numbers in groups.values():
-            self._run_group(rigs, numbers, duration_s, Mode(), found)
+            alone = len(numbers) <= _ALONE_MAX and apart >= _APART_MIN
+            lanes = self._single() if alone else self._loaded()
+            self._run_group(lanes, rigs, numbers, duration_s, Mode(), found)
         return [found[number] for number in range(len(rigs))]
 
     def _run_group(
         self,
+        lanes: Lanes,
         rigs: Sequence[Rig],
         numbers: Sequence[int],
         duration_s: float,
@@ -72,7 +85,7 @@ class LaneEngine:
     ) -> None:
         """Find the outcomes of some rigs with equal keys, by their numbers."""
         chosen = [rigs[number] for number in numbers]
-        result = run_group(self._loaded(), chosen, duration_s, mode, self._threads)
+        result = run_group(lanes, chosen, duration_s, mode, self._threads)
         found.update(zip(numbers, outcomes_of(result, len(numbers)), strict=True))
         repeats, causes = result.of("repeat"), result.of("cause")
         by_loop = [number for k, number in enumerate(numbers) if repeats[k] == _BY_LOOP]
@@ -80,13 +93,13 @@ class LaneEngine:
         found.update(zip(by_loop, plain, strict=True))
         exact = [number for k, number in enumerate(numbers) if repeats[k] == _WITH_EXACT]
         if exact:
-            self._run_group(rigs, exact, duration_s, mode._replace(exact_chatter=True), found)
+            self._run_group(lanes, rigs, exact, duration_s, mode._replace(exact_chatter=True), found)
         unknown = [k for k in range(len(numbers)) if causes[k] == DISTURBANCE and not repeats[k]]
         if mode.kept:
             self._find_causes(chosen, [(k, numbers[k]) for k in unknown], result, found)
         elif unknown:
             kept = mode._replace(kept=samples_kept(chosen[0]))
-            self._run_group(rigs, [numbers[k] for k in unknown], duration_s, kept, found)
+            self._run_group(lanes, rigs, [numbers[k] for k in unknown], duration_s, kept, found)
 
     @staticmethod
     def _find_causes(

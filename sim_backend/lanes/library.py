@@ -61,6 +61,17 @@ def load(lanes: int = LANES, instruction_set: InstructionSet | None = None) -> L
     return load_file(compiled(Target("a sweep in lanes", "liblanes.so", _FILES, flags)), lanes)
 
 
+def load_single() -> Lanes:
+    """Compile the library of one lane if need be, and load it.
+
+    Raises
+    ------
+    OpenError
+        If it cannot be compiled or loaded.
+    """
+    return load(1)
+
+
 def flags_for(instruction_set: InstructionSet, lanes: int) -> tuple[str, ...]:
     """Return the compiler's flags for a library of so many lanes."""
     return (*SHARED, *_OPTIMISATION, *instruction_set.flags, f"-DDCMP_LANES={lanes}")

@@ -15,7 +15,7 @@ from sim_backend.lanes import engine, library
 from sim_backend.lanes.engine import LaneEngine
 from sim_backend.lanes.instruction_sets import SETS, here
 from tests.sim_backend.lanes.mixed import MIXED_S, mixed
-from tests.sim_backend.lanes.runs import CASES, REPEATED, TRIPS, drawn, unequal
+from tests.sim_backend.lanes.runs import CASES, REPEATED, TRIPS, drawn, rig_of, unequal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,3 +112,15 @@ def test_some_runs_are_repeated_by_the_plain_loop(name: str, monkeypatch: pytest
     monkeypatch.setattr(engine, "PlainLoop", _Counted)
     assert not unequal(LaneEngine(), rigs, 0.5)
     assert sum(repeated) == 1
+
+
+def test_many_runs_that_have_nothing_in_common_go_in_single_lanes() -> None:
+    rigs = [rig_of(f"reference.amplitude_rad={0.5 + 0.01 * k:g}") for k in range(64)]
+    asked = []
+
+    def single() -> Lanes:
+        asked.append(1)
+        return library.load(1)
+
+    assert LaneEngine(single=single).run(rigs, 0.05) == LaneEngine(single=library.load).run(rigs, 0.05)
+    assert len(asked) == len(rigs)
