@@ -92,8 +92,21 @@ def _uneven(samples: Sequence[Sample]) -> list[Sample]:
     return [s._replace(t=s.t + shifts.get(k % 200, 0.0) * T) for k, s in enumerate(samples)]
 
 
+def _innovations(sizes: Sequence[float], rig: ObserverContext) -> list[Sample]:
+    """Return samples of which every second one has an innovation of a given size, rad, to the last bit."""
+    h11, found = tune(rig, L1=4.9, L2=5.51, M=None, mu0=None).nominal[6], list[Sample]()
+    for k, size in enumerate(sizes):
+        near = [size / (1.0 - h11) * (1.0 + n * 1.1e-16) for n in range(-400, 401)]
+        y = min(near, key=lambda each: abs(each - h11 * each - size))
+        found += [Sample(0.1 * k, 0.0, 0.0), Sample(0.1 * k + T, y, 0.0)]
+    return found
+
+
 QUANTISED, IDEAL = ride(), ride(None)
 RIG, FINE = context(), context(None)
+LEAST = (1e-30, 0.9995e-30, 1.0005e-30, math.nextafter(1e-30, 0.0))  # rad, around the least innovation
+AT_THE_FLOOR = Gains(M=1.0, mu0=53.0 / 7.0)  # whose sliding gains there differ in their last bits
+FLOOR_FROM = 1.0 / (53.0 / 7.0 * (53.0 / 7.0) * (53.0 / 7.0))  # rad
 RIDES: dict[str, tuple[list[Sample], ObserverContext, Gains]] = {
     "quantised": (QUANTISED, RIG, Gains()),
     "ideal": (IDEAL, FINE, Gains()),
@@ -105,6 +118,9 @@ RIDES: dict[str, tuple[list[Sample], ObserverContext, Gains]] = {
     "lost samples, ideal": (thinned(IDEAL), FINE, Gains()),
     "no number": (_spoilt(IDEAL), FINE, Gains()),
     "uneven": (_uneven(IDEAL), FINE, Gains()),
+    "least innovation": (_innovations(LEAST, FINE), FINE, Gains()),
+    "innovation at the floor": (_innovations([FLOOR_FROM], FINE), FINE, AT_THE_FLOOR),
+    "least slope": (IDEAL, FINE, Gains(M=1e-30, mu0=0.0)),
     "at rest": ([Sample(k * T, 0.5, 0.0) for k in range(100)], FINE, Gains()),
 }
 WANTED = {name: _r1_in_python(*given) for name, given in RIDES.items()}
@@ -122,6 +138,10 @@ def test_rides_reach_what_they_are_for() -> None:
     assert np.isnan(WANTED["no number"]).any(axis=1).sum() == 201
     assert np.isnan(WANTED["uneven"]).any(axis=1).sum() > 10
     assert len(_others(uneven, FINE, Gains())) > 11 * 20
+    h11 = tune(FINE, L1=4.9, L2=5.51, M=None, mu0=None).nominal[6]
+    for name, size in (("least innovation", 1e-30), ("innovation at the floor", FLOOR_FROM)):
+        y = RIDES[name][0][1].position
+        assert y - h11 * y == size
 
 
 GAINS_AT = np.concatenate(
