@@ -173,3 +173,12 @@ def test_the_picture_follows_what_was_swept(changes: dict[str, Any], kind: str, 
     result = sweep({**SMALL, "duration_s": 0.05, "runs": 1 if kind == "heat map" else 3, **changes})
     assert draw_sweep(result, tmp_path / "sweep.png") == kind
     assert (tmp_path / "sweep.png").read_bytes()[1:4] == b"PNG"
+
+
+@pytest.mark.usefixtures("needs_compiler")
+def test_a_mixed_sweep_is_split_and_has_the_bits_of_the_plain_loop() -> None:
+    tables = {**SMALL, "runs": 1, "grid": {"observer.kind": ["super_twisting", "kalman"]}}
+    mixed, plain = sweep(tables), sweep(tables, plain=True)
+    assert mixed.table.column("engine").to_pylist() == ["lanes", "plain"]
+    figures = [*FIGURES, "tripped", "trip_cause"]
+    assert mixed.table.select(figures).equals(plain.table.select(figures))
