@@ -22,7 +22,8 @@ def engine_sentences(prepared: PreparedSweep, where: str) -> list[str]:
     for one in prepared.shares:
         share = "" if one.share >= 1.0 - prepared.refused else f" for {one.share:.0%} of the runs"
         why = f": {' '.join(one.reasons)}" if one.reasons else ""
-        found.append(f"engine: {_ENGINES[one.engine]}{share}, in {where}{why}")
+        cost = f"{1e3 * one.cpu_s:.3g} ms of CPU time a run"
+        found.append(f"engine: {_ENGINES[one.engine]}{share}, {cost}, in {where}{why}")
     if prepared.refused:
         found.append(f"refused: about {prepared.refused:.0%} of the runs, by the rules of the rig")
     return found
