@@ -1,4 +1,4 @@
-"""Failures of a cluster in words: each says what to do, and that nothing is lost which is written."""
+"""Failures of a cluster in words: each says what to do. The sweep adds how much it keeps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from dcmp_hil.sweeping.cluster_worker import Installed
     from dcmp_hil.sweeping.executor import SweepBlock
 
-_CONTINUE = "What is finished is kept: the same command goes on with the rest."
 _CONSISTENT = "Scheduler, workers and this computer need the same version of Dask and of Python"
 
 
@@ -35,7 +34,7 @@ def other_versions(where: str, here: Installed, there: Installed) -> BackendErro
     """Return that a worker would give other bits."""
     return BackendError(
         f"The worker {where} has {there}, and this computer {here}: the same run would differ. "
-        f"Install dcmp-hil {here.version} there, or take that worker off the cluster. {_CONTINUE}"
+        f"Install dcmp-hil {here.version} there, or take that worker off the cluster."
     )
 
 
@@ -43,7 +42,7 @@ def unusable_worker(where: str, error: BaseException) -> BackendError:
     """Return that a worker cannot do this work, such as without dcmp-hil."""
     return BackendError(
         f"The worker {where} cannot run a sweep ({_text(error)}): install dcmp-hil there as here, "
-        f"with its `cluster` extra, or take that worker off the cluster. {_CONTINUE}"
+        f"with its `cluster` extra, or take that worker off the cluster."
     )
 
 
@@ -51,7 +50,7 @@ def lost_workers(address: str, waited_s: float) -> BackendError:
     """Return that the last worker has gone."""
     return BackendError(
         f"The Dask cluster at {address} has lost its last worker, and no other came within {waited_s:g} s: "
-        f"start some with `dask worker {address}`. {_CONTINUE}"
+        f"start some with `dask worker {address}`."
     )
 
 
@@ -59,7 +58,7 @@ def lost_scheduler(address: str) -> BackendError:
     """Return that the scheduler has gone."""
     return BackendError(
         f"The Dask scheduler at {address} has gone, or is not reached any more: see that it runs, and why "
-        f"it ended. {_CONTINUE}"
+        f"it ended."
     )
 
 
@@ -67,7 +66,7 @@ def silent_scheduler(address: str, waited_s: float) -> BackendError:
     """Return that the scheduler is there and does not answer."""
     return BackendError(
         f"The Dask scheduler at {address} has not answered for {waited_s:g} s: see whether it stands "
-        f"still, or the network does. {_CONTINUE}"
+        f"still, or the network does."
     )
 
 
@@ -78,13 +77,13 @@ def failed_block(block: SweepBlock, error: BaseException) -> BackendError:
         tries = getattr(error, "allowed_failures", 0) + 1
         return BackendError(
             f"{tries} workers in succession died while they had block {block.number} ({runs}): their logs "
-            f"say why; give each more memory, or fewer threads. {_CONTINUE}"
+            f"say why; give each more memory, or fewer threads."
         )
     if isinstance(error, ModuleNotFoundError):
         return unusable_worker(f"that had block {block.number}", error)
     return BackendError(
         f"Block {block.number} ({runs}) failed on a worker ({_text(error)}): without --scheduler it runs "
-        f"here, and shows more. {_CONSISTENT}. {_CONTINUE}"
+        f"here, and shows more. {_CONSISTENT}."
     )
 
 
