@@ -85,7 +85,7 @@ class LaneCosts:
         return (
             f"{'met' if fast and short else 'MISSED'}: lanes ({self.instruction_set}), plant step "
             f"{self.bars.step_us:g} us: {rate:.1f} million cycles a CPU-second, {ratio:.0f} x the plain loop "
-            f"({self.goals[0]}); 10,000 runs of 30 s take {sweep:.0f} CPU-s{bar}"
+            f"({self.goals[0]}); at that rate 10,000 runs of 30 s take {sweep:.0f} CPU-s{bar}"
         )
 
 
