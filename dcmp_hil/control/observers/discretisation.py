@@ -69,6 +69,11 @@ def matched_gains(x: float) -> ObserverGains:
         mu T, bandwidth times step; capped at 50, where the gains have reached (1, 1.5, 1).
         NaN gives NaN.
     """
+    return ObserverGains(*plain_gains(x))
+
+
+def plain_gains(x: float) -> tuple[float, float, float]:
+    """Return `matched_gains` as a plain tuple: 0.08 us less a step of R1, which asks in a third of them."""
     x = min(x, _BANDWIDTH_STEP_MAX)
     e, s, d = expm1(-_ROOT_A * x), sine(0.5 * _ROOT_C * x), -expm1(-_ROOT_R * x)
     g = (1.0 + e) * (s * s)
@@ -77,7 +82,7 @@ def matched_gains(x: float) -> ObserverGains:
     p1 = d + e1
     p3 = d * e0
     p2 = d * e1 + e0 - 0.5 * p3
-    return ObserverGains(p1 - p2 + 0.5 * p3, p2 - p3, p3)
+    return p1 - p2 + 0.5 * p3, p2 - p3, p3
 
 
 _Pair = tuple[float, float]

@@ -11,7 +11,12 @@ from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
 from dcmp_hil.control.elementary import inverse_cube_root
 from dcmp_hil.control.observers import GAP_PERIODS_MAX, STEP_TOLERANCE_PERIODS, standing_still
-from dcmp_hil.control.observers.discretisation import ObserverGains, luenberger_copy, matched_gains
+from dcmp_hil.control.observers.discretisation import (
+    ObserverGains,
+    luenberger_copy,
+    matched_gains,
+    plain_gains,
+)
 from dcmp_hil.control.observers.settings import ObserverSettings
 from dcmp_hil.values import Estimate, Sample
 
@@ -263,7 +268,7 @@ class SuperTwisting:
         size, M, mu = abs(b), self.M, self.mu0
         if size >= _INNOVATION_MIN_RAD and M >= _SLOPE_MIN_RAD_S3:
             mu = inverse_cube_root(size / M)
-        k1, k2, k3 = matched_gains(mu * dt)
+        k1, k2, k3 = plain_gains(mu * dt)
         return k1, k2 / dt, k3 / (dt * dt)
 
 
