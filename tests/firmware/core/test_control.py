@@ -102,6 +102,11 @@ def _innovations(sizes: Sequence[float], rig: ObserverContext) -> list[Sample]:
     return found
 
 
+def _at_floor(mu0: float) -> tuple[list[Sample], ObserverContext, Gains]:
+    """Return a ride with an innovation at the floor, where the sliding gains differ in their last bits."""
+    return _innovations([1.0 / (mu0 * mu0 * mu0)], context(None)), context(None), Gains(M=1.0, mu0=mu0)
+
+
 QUANTISED, IDEAL = ride(), ride(None)
 RIG, FINE = context(), context(None)
 LEAST = (1e-30, 0.9995e-30, 1.0005e-30, math.nextafter(1e-30, 0.0))  # rad, around the least innovation
@@ -120,6 +125,7 @@ RIDES: dict[str, tuple[list[Sample], ObserverContext, Gains]] = {
     "uneven": (_uneven(IDEAL), FINE, Gains()),
     "least innovation": (_innovations(LEAST, FINE), FINE, Gains()),
     "innovation at the floor": (_innovations([FLOOR_FROM], FINE), FINE, AT_THE_FLOOR),
+    **{f"floor {k} / 7": _at_floor(k / 7.0) for k in (89, 106, 109, 167, 178)},
     "least slope": (IDEAL, FINE, Gains(M=1e-30, mu0=0.0)),
     "at rest": ([Sample(k * T, 0.5, 0.0) for k in range(100)], FINE, Gains()),
 }
