@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests import tracing
 from tests.firmware.core_library import compiler
@@ -22,6 +23,10 @@ _SLOW = (
     *(f"tests/{name}/" for name in ("attacks", "conformance", "faults", "install", "panel", "walk")),
     "tests/sweeping/test_cluster",
 )
+
+# An example that a busy computer is slow at is no fault.
+settings.register_profile("dcmp-hil", settings(), deadline=None)
+settings.load_profile("dcmp-hil")
 
 # Between the look for a free port and its use another worker could take it.
 screenshot.FIRST_PORT += 100 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])

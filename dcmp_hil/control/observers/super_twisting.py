@@ -28,8 +28,7 @@ _WATCH_BANDWIDTH_RATIO, _WATCH_BANDWIDTH_MAX_RAD_S = 2.5, 100.0  # times the rul
 _MU0_RULE_RATIO_MAX = 3.0
 _BANDWIDTH_MIN_RAD_S = 4.0
 """Rad/s, of the floor: below it an arm that is led to its limits overshoots them."""
-_INNOVATION_MIN_RAD = 1e-30  # rad: an innovation below it has no defined sliding bandwidth
-_SLOPE_MIN_RAD_S3 = 1e-30  # rad/s3: below it, M is none
+_INNOVATION_MIN_RAD, _SLOPE_MIN_RAD_S3 = 1e-30, 1e-30  # below either no sliding bandwidth is defined
 
 _Step = tuple[float, float, float, float, float, float, float, float, float, float, float]
 """f12 f22 gu1 gu2 h01 h02 h11 h12 of the copy in differences, and k1, k2 / T, k3 / T^2."""
@@ -260,8 +259,7 @@ class SuperTwisting:
         n = round(dt / self._period)
         if n in self._gaps and abs(dt - n * self._period) < self._tolerance:
             return self._gaps[n]
-        gains = _per_step(matched_gains(self.mu0 * dt), dt)
-        return (*luenberger_copy(dt, self._f0, self._L1, self._L2).differences(), *gains)
+        return _solve(dt, self._f0, self._L1, self._L2, self.mu0)
 
     def _sliding_gains(self, b: float, dt: float) -> tuple[float, float, float]:
         """Gains of an innovation so small that the sliding term is faster than the floor."""
