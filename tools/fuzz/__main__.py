@@ -29,7 +29,7 @@ def _asked() -> argparse.Namespace:
         "--jobs", type=int, default=min(2, os.cpu_count() or 1), help="processes (default: 2)"
     )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=int, default=180, help="the longest it may take (default: 180)")
+    parser.add_argument("--seconds", type=int, default=900, help="the longest it may take (default: 900)")
     parser.add_argument(
         "--no-branches", action="store_true", help="do not ask whether every branch was reached"
     )
