@@ -31,6 +31,13 @@ void CHECK(judged)(const double *rows, double *out, uint32_t n)
     }
 }
 
+void CHECK(stepped)(const double *rows, double *out, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        out[i] = dcmp_stepped((real)rows[2u * i], (real)rows[2u * i + 1u]) ? 1.0 : 0.0;
+    }
+}
+
 static void put(double *out, const struct dcmp_friction_kalman *filter, struct dcmp_estimate ahead)
 {
     const struct dcmp_motion *state = &filter->state;

@@ -35,6 +35,8 @@ void CHECK(known_friction)(double f1, double volts, const double *rows, double *
 
 /* dcmp_friction_kalman.h */
 void CHECK(moved)(const double *rows, double *out, uint32_t n);  /* x1 x2 d f s step u f0 gravity */
+/* Rows of the mean and the innovation; 1 for a step of the disturbance. */
+void CHECK(stepped)(const double *rows, double *out, uint32_t n);
 void CHECK(judged)(const double *rows, double *out, uint32_t n); /* the trust, nu, step, edge */
 /* x1 x2 d f s, the covariance, the trust, a, sticks, t, of the last edge, y, rise, step; out come state, covariance, trust,
  * sticks and steps. */

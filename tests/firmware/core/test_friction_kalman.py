@@ -12,7 +12,7 @@ from dcmp_hil.control.model import Model
 from dcmp_hil.control.observers.friction_kalman.motion import moved
 from dcmp_hil.control.observers.friction_kalman.observer import FrictionKalman
 from dcmp_hil.control.observers.friction_kalman.predictor import FrictionPredictor
-from dcmp_hil.control.observers.friction_kalman.trust import judged
+from dcmp_hil.control.observers.friction_kalman.trust import judged, stepped
 from dcmp_hil.errors import ProtocolError
 from dcmp_hil.values import Estimate, Reference, Sample
 from tests.firmware.law import Array, Law, T, context, reference, ride, same_bits, thinned
@@ -253,6 +253,16 @@ def test_trust_has_the_bits_of_python(core: Core) -> None:
     rows = _trusts()
     wanted = [judged((*row[:6],), row[6], row[7], row[8] > 0.0) for row in rows.tolist()]
     assert same_bits(Law(core)("judged", rows, width=6), np.array(wanted))
+
+
+def test_a_step_of_the_disturbance_is_assumed_at_the_same_means_and_innovations(core: Core) -> None:
+    bound = math.sqrt(30.0 / 9.0)
+    means = [sign * bound * (1.0 + off) for sign in (1.0, -1.0) for off in (-0.1, -1e-4, 1e-4, 0.1)]
+    sizes = (0.0, 0.999, 1.0, math.nextafter(1.0, 2.0), 3.0)
+    rows = np.array([(mean, sign * size) for mean in means for sign in (1.0, -1.0) for size in sizes])
+    wanted = np.array([float(stepped(mean, nu)) for mean, nu in rows.tolist()])
+    assert set(wanted.tolist()) == {0.0, 1.0}
+    assert same_bits(Law(core)("stepped", rows), wanted)
 
 
 @pytest.mark.parametrize(("name", "bounds"), [("quiet", (2e-6, 1e-4, 2e-3)), ("at rest", (1e-5, 1e-3, 0.03))])

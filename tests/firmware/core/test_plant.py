@@ -77,6 +77,7 @@ def test_encoder_has_the_bits_of_python(core: Core, counts: float | None, phase:
         (10.0, 0.45, 0.4, 0.1),
         (10.0, math.inf, 0.0, 0.35),  # 10 V is nearest to 10.15 V
         (10.0, math.inf, 0.0, 0.5),  # the limit is a whole number of steps: it can be reached
+        (0.5, math.inf, 0.0, 0.35),  # the same where steps are below 1 V
         (math.inf, math.inf, 0.0, 1e-6),
         (2.0, 1e-3, 0.01, 0.0),
     ],
