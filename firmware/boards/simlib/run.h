@@ -13,7 +13,6 @@
 
 #define RUN_STEP_NUMBERS 11  /* f12 f22 gu1 gu2 h01 h02 h11 h12 k1 k2 k3 of one step of R1 */
 #define RUN_GAPS 10          /* steps of 1 to 10 periods */
-#define RUN_NUMBERS 6        /* of the sentence of a trip */
 #define RUN_FIELDS 22        /* numbers of a row: dcmp_hil.ipc.ring.FIELDS */
 #define RUN_FURTHER 8        /* behind them with the friction filter: FrictionKalman.DIAGNOSIS */
 #define RUN_EVENTS_MIN 16    /* free places of the log that a cycle may need */
@@ -171,9 +170,9 @@ enum {
 enum {
     RUN_ROWS_FULL = 1,       /* `out` has no free row: take the rows, call again */
     RUN_LOG_FULL = 2,        /* `log` has fewer than RUN_EVENTS_MIN free places: take the events, call again */
-    RUN_BEGINS = 3,          /* the trajectory begins at run_progress.began, from x0: make rows from this tick on, call again */
+    RUN_BEGINS = 3,          /* the trajectory begins at `began`, from x0: make rows from `tick` on, call again */
     RUN_ASKS = 4,            /* give answer_x, answer_v, answer_a of device time `asked`, as `whole` says; call again */
-    RUN_REFERENCES_USED = 5, /* the rows do not have run_progress.tick: give rows from this tick on, call again */
+    RUN_REFERENCES_USED = 5, /* the rows do not have `tick`: give rows from it on, call again */
     RUN_REACHED = 6,         /* the cycle at or after `until` has ended */
     RUN_OVER = 7             /* the run is over: see cause, orderly and numbers. 0 V has been sent, the row is written */
 };
@@ -185,7 +184,7 @@ struct run_progress {
     int64_t fresh;      /* flag: loop.run was called anew (the way down); C sets it to 0. 1 before the first call */
     int64_t whole;      /* flag: what the rows are, see run_reference */
     int64_t has_now;    /* flag: the rows have x_now, v_now, a_now; else RUN_ASKS */
-    int64_t has_middle; /* flag: the rows have x_middle, v_middle; else RUN_ASKS where they are needed. A cycle after a gap asks */
+    int64_t has_middle; /* flag: the rows have x_middle, v_middle; else RUN_ASKS. A cycle after a gap asks */
     int64_t first_row;  /* tick of rows[0] */
     double answer_x;    /* to RUN_ASKS: rad, rad/s, rad/s2 */
     double answer_v;
@@ -207,34 +206,19 @@ struct run_progress {
     double deviation;   /* (rad/s2)/V */
     int64_t cause;      /* enum dcmp_cause of core/dcmp_cause.h; 0 for none. The first one, also while stopping */
     int64_t cause_tick; /* of the cycle that found it */
+    double first;       /* numbers of its sentence, as dcmp_cause.h says; those of DCMP_CAUSE_NUMBERS are in the last row, */
+    double second;      /* and the gain of DCMP_CAUSE_PROBE_GAIN is `gain` */
     int64_t orderly;    /* flag, at RUN_OVER: the voltage was led to 0 V before the end */
-    int64_t remembers;  /* flag, at RUN_OVER: the watching observer has taken the last sample (the diagnosis has it) */
-    double numbers[RUN_NUMBERS]; /* of the cause's sentence, see below */
+    int64_t remembers;  /* flag: the watching observer has taken the newest sample (the diagnosis remembers it) */
 };
-
-/* Numbers of a cause, in the order of its sentence; t is cause_tick * period:
- *   not finite        position, voltage, x1, x2, w of the estimate
- *   demand            demand, V
- *   speed             velocity, rad/s (of the run's observer, or of the one that watches)
- *   travel            position, rad
- *   disturbance       filtered, rad/s2
- *   jump              moved, rad
- *   moving            moved, rad; since, s
- *   power, polarity   up, down: rad
- *   gain              gain / ku; up, down: rad
- *   slew              reached, V; length of the first push, s
- *   not finite, probe position, rad; voltage, V
- *   tracking          reference, rad; position, rad
- *   saturation        demand, V
- *   chatter           mean, V/s */
 
 #define RUN_API __attribute__((visibility("default")))
 
 RUN_API int64_t run_state_bytes(void);
 RUN_API void run_begin(void *state, const struct run_parameters *parameters);
 
-/* Run cycles; `out` has `max_rows` rows of RUN_FIELDS numbers, with the friction filter RUN_FIELDS + RUN_FURTHER. Returns why it
- * stopped, RUN_ROWS_FULL to RUN_OVER. */
+/* Run cycles; `out` has `max_rows` rows of RUN_FIELDS numbers, with the friction filter RUN_FIELDS + RUN_FURTHER. Returns why
+ * it stopped, RUN_ROWS_FULL to RUN_OVER. */
 RUN_API int64_t run_cycles(void *state, struct run_progress *progress, const struct run_reference *rows, int64_t n_rows,
                            double *out, int64_t max_rows, struct run_event *log, int64_t max_log);
 
