@@ -23,7 +23,7 @@ from dcmp_hil.loop import LoopStages
 from dcmp_hil.safety.chatter import Chatter
 from dcmp_hil.safety.deadline_monitor import DeadlineMonitor
 from dcmp_hil.safety.limiter import Limiter
-from dcmp_hil.safety.monitors import DisturbanceWatch, FiniteMonitor, RangeMonitor
+from dcmp_hil.safety.monitors import WATCHING_OBSERVER, DisturbanceWatch, FiniteMonitor, RangeMonitor
 from dcmp_hil.safety.outlier_filter import OutlierFilter
 from dcmp_hil.safety.polarity_check import probe_for
 from dcmp_hil.safety.speed_resolution import resolution
@@ -229,7 +229,7 @@ def make_supervisor(
         watch = SuperTwisting(setting, mu0=watch_floor(setting.counts_per_rev, setting.period))
         position, velocity = limits.position_limit_rad, limits.velocity_limit_rad_s
         spare = resolution(rig.encoder.count, rig.period)
-        independent = RangeMonitor(position, velocity, spare, "the supervisor's own observer")
+        independent = RangeMonitor(position, velocity, spare, WATCHING_OBSERVER)
         second = DisturbanceWatch(watch, setting, limits.disturbance_limit_rad_s2, ranges=independent)
         chatter.samples = second.samples
         limiter.watch_variation(chatter)

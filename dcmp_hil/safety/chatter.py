@@ -14,7 +14,7 @@ from dcmp_hil.errors import Explanation
 from dcmp_hil.trip_request import TripRequest, Urgency
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
 
     from dcmp_hil.values import Sample
 
@@ -82,21 +82,38 @@ class Chatter:
         goes_on = mean >= self._limit and sum(rates[-2:]) >= quiet
         self._bursts = self._bursts + _BURST_WEIGHT if goes_on else max(0, self._bursts - _PAUSE_WEIGHT)
         steady = goes_on and len(rates) > _WINDOW_BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
-        return self._stop(t, mean) if steady or self._bursts >= _BURST_SCORE_MAX else None
+        if not steady and self._bursts < _BURST_SCORE_MAX:
+            return None
+        return chattering(t, mean, self._expected, self._cause)
 
-    def _stop(self, t: float, mean: float) -> TripRequest:
-        said = (
-            f"it changed by {mean:,.0f} V/s on average in the half second before t = {t:.3f} s; "
-            f"{self._expected:,.0f} V/s are expected with this rig, {self._limit:,.0f} allowed."
-        )
-        sentence, remedy = _CONTROLLER
-        explain = partial(self._explanation, said)
-        return TripRequest("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
+    def _cause(self) -> tuple[str, str]:
+        return cause_of(self.samples, self._count)
 
-    def _explanation(self, said: str) -> Explanation:
-        """Return the likely cause of the chatter, with its remedy."""
-        sentence, remedy = cause_of(self.samples, self._count)
-        return Explanation("chatter", f"{sentence}: {said}", remedy)
+
+def chattering(t: float, mean: float, expected: float, find: Callable[[], tuple[str, str]]) -> TripRequest:
+    """Return the request to trip for a voltage that chatters.
+
+    Parameters
+    ----------
+    t
+        s, device time.
+    mean, expected
+        V/s, variation in the last half second, and what this rig explains of it.
+    find
+        Finds the likely cause and its remedy.
+    """
+    said = (
+        f"it changed by {mean:,.0f} V/s on average in the half second before t = {t:.3f} s; "
+        f"{expected:,.0f} V/s are expected with this rig, {limit_V_s(expected):,.0f} allowed."
+    )
+    sentence, remedy = _CONTROLLER
+    explain = partial(_explanation, said, find)
+    return TripRequest("chatter", f"{sentence}: {said}", remedy, Urgency.RAMP, explain=explain)
+
+
+def _explanation(said: str, find: Callable[[], tuple[str, str]]) -> Explanation:
+    sentence, remedy = find()
+    return Explanation("chatter", f"{sentence}: {said}", remedy)
 
 
 def block_cycles(period: float) -> int:

@@ -24,6 +24,16 @@ _SPEED_UP_TIME_MIN_S = 0.02  # s from rest to the largest velocity
 CONSECUTIVE_GAP_PERIODS_MAX = 2.5
 """Periods between two cycles of one condition, at most."""
 
+LIMITS = {
+    "reference": "reference limited to {:.4g} rad: it asks for {:.4g}",
+    "velocity": "reference's velocity limited to {:.4g} rad/s: it asks for {:.4g}",
+    "acceleration": "reference's acceleration limited to {:.4g} rad/s2: it asks for {:.4g}",
+    "way": "reference's way limited: the arm is led to {:.4g} rad as the limits allow",
+    "voltage": "voltage limited: {:.1f} V asked for, {:.1f} V allowed",
+    "slew": "slew limited: {:.1f} V asked for after {:.1f} V",
+}
+"""Sentences of the limits, by name."""
+
 
 class _Lasting:
     """Whether something has gone on for long enough, told only of the periods in which it does."""
@@ -141,14 +151,7 @@ class Limiter:
         """Report a limited reference; stop if the arm is too far from the governed one."""
         x = reference.position
         if not abs(x - sample.position) <= self._error and self._astray.too_long(sample.t):
-            self.objection = TripRequest(
-                "tracking",
-                f"The arm has been more than {self._error:g} rad off the reference for "
-                f"{_TRACKING_ERROR_TIME_MAX_S:g} s (reference {x:.2f} rad, position {sample.position:.2f} "
-                f"rad, t = {sample.t:.3f} s).",
-                "Look for an obstacle, and at the reference, the gains and supervisor.error_limit_rad.",
-                Urgency.RAMP,
-            )
+            self.objection = astray(sample.t, x, sample.position, self._error)
         if reference is not asked:
             self._say_governed(sample.t, asked)
         return reference
@@ -156,26 +159,22 @@ class Limiter:
     def _say_governed(self, t: float, reference: Reference) -> None:
         x, v, a = reference
         if not abs(x) <= self._x:
-            self._say(t, "reference", "reference limited to {:.4g} rad: it asks for {:.4g}", self._x, x)
+            self._say(t, "reference", self._x, x)
         elif not abs(v) <= self._v:
-            said = "reference's velocity limited to {:.4g} rad/s: it asks for {:.4g}"
-            self._say(t, "velocity", said, self._v, v)
+            self._say(t, "velocity", self._v, v)
         elif not abs(a) <= self._a:
-            said = "reference's acceleration limited to {:.4g} rad/s2: it asks for {:.4g}"
-            self._say(t, "acceleration", said, self._a, a)
+            self._say(t, "acceleration", self._a, a)
         else:
-            said = "reference's way limited: the arm is led to {:.4g} rad as the limits allow"
-            self._say(t, "way", said, x)
+            self._say(t, "way", x)
 
     def _limited_voltage(self, t: float, demand: float, last: float) -> float:
         most = self.voltage_limit
         voltage = max(-most, min(most, demand))
         if voltage != demand:
-            said = "voltage limited: {:.1f} V asked for, {:.1f} V allowed"
-            self._say(t, "voltage", said, demand, most)
+            self._say(t, "voltage", demand, most)
         slewed = self.limit_slew(voltage, last) if self._slews else voltage
         if slewed != voltage:
-            self._say(t, "slew", "slew limited: {:.1f} V asked for after {:.1f} V", voltage, last)
+            self._say(t, "slew", voltage, last)
         if slewed != demand:
             self._note_clamp(t, demand)
         return slewed
@@ -183,15 +182,56 @@ class Limiter:
     def _note_clamp(self, t: float, demand: float) -> None:
         self.clamped += 1
         if self._saturated.too_long(t):
-            self.objection = TripRequest(
-                "saturation",
-                f"The controller has asked for more than it may have for {_SATURATION_TIME_MAX_S:g} s "
-                f"({demand:.1f} V at t = {t:.3f} s, {self.voltage_limit:g} V allowed).",
-                "Ask for less in [reference], look for an obstacle, or raise amplifier.voltage_limit_V or "
-                "amplifier.slew_V_s if the amplifier has more.",
-                Urgency.RAMP,
-            )
+            self.objection = saturated(t, demand, self.voltage_limit)
 
-    def _say(self, t: float, limit: str, sentence: str, *values: float) -> None:
+    def _say(self, t: float, limit: str, *values: float) -> None:
         if self._rate_limit.passes(limit, t):
-            self._notify(Event(t, "WARN", EventKind.LIMIT, sentence.format(*values), LimitData(limit)))
+            self._notify(limit_event(t, limit, *values))
+
+
+def limit_event(t: float, limit: str, *values: float) -> Event:
+    """Return the event that a limit acts at `t` (s, device time).
+
+    Parameters
+    ----------
+    t
+        s.
+    limit
+        One of `LIMITS`.
+    values
+        The numbers of its sentence; further ones are left out.
+    """
+    return Event(t, "WARN", EventKind.LIMIT, LIMITS[limit].format(*values), LimitData(limit))
+
+
+def astray(t: float, reference: float, position: float, error: float) -> TripRequest:
+    """Return the request to trip for an arm that was off its reference for too long.
+
+    Parameters
+    ----------
+    t
+        s, device time.
+    reference, position
+        rad.
+    error
+        rad, by which they may differ.
+    """
+    return TripRequest(
+        "tracking",
+        f"The arm has been more than {error:g} rad off the reference for {_TRACKING_ERROR_TIME_MAX_S:g} s "
+        f"(reference {reference:.2f} rad, position {position:.2f} rad, t = {t:.3f} s).",
+        "Look for an obstacle, and at the reference, the gains and supervisor.error_limit_rad.",
+        Urgency.RAMP,
+    )
+
+
+def saturated(t: float, demand: float, limit: float) -> TripRequest:
+    """Return the request to trip for demands (V) beyond the limit (V) for too long, at `t` (s)."""
+    return TripRequest(
+        "saturation",
+        f"The controller has asked for more than it may have for {_SATURATION_TIME_MAX_S:g} s "
+        f"({demand:.1f} V at t = {t:.3f} s, {limit:g} V allowed).",
+        "Ask for less in [reference], look for an obstacle, or raise amplifier.voltage_limit_V or "
+        "amplifier.slew_V_s if the amplifier has more.",
+        Urgency.RAMP,
+    )

@@ -13,11 +13,14 @@ from dcmp_hil.trip_request import TripRequest
 from dcmp_hil.values import Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
 
     from dcmp_hil.control.observers import Observer, ObserverContext
+    from dcmp_hil.safety.diagnosis import Finding
     from dcmp_hil.values import Estimate, Sample
 
+RUN_OBSERVER, WATCHING_OBSERVER = "the run's observer", "the supervisor's own observer"
+"""Whose estimate a velocity is, in sentences."""
 _HEALTHY = Fault.NONE  # found here faster than in its class
 _MINUS_INF, _INF = -math.inf, math.inf
 _FILTER_TIME_S, _ABOVE_TIME_S = 10e-3, 5e-3  # s, of the watching observer's disturbance
@@ -34,12 +37,7 @@ class FiniteMonitor:
             return TripRequest("device_fault", f"{sentence} (fault {fault}, t = {t:.3f} s).", remedy)
         x1, x2, w = estimate
         if not _MINUS_INF < t + position + voltage + x1 + x2 + w < _INF:  # a sum with a NaN is one
-            return TripRequest(
-                "not_finite",
-                f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
-                f"estimate ({x1}, {x2}, {w}).",
-                "Look for a gain that makes the observer diverge, and at the encoder.",
-            )
+            return not_finite(sample, estimate)
         return None
 
 
@@ -64,7 +62,7 @@ class RangeMonitor:
     """
 
     def __init__(
-        self, position: float, velocity: float, spare: float = 0.0, seen_by: str = "the run's observer"
+        self, position: float, velocity: float, spare: float = 0.0, seen_by: str = RUN_OBSERVER
     ) -> None:
         self._position = position
         self._velocity, self.velocity_max, self._seen_by = velocity, velocity + spare, seen_by
@@ -74,18 +72,9 @@ class RangeMonitor:
         t, position, _, _ = sample
         _, velocity, _ = estimate
         if not abs(velocity) <= self.velocity_max:
-            return TripRequest(
-                "speed",
-                f"Estimated velocity {velocity:.2f} rad/s at t = {t:.3f} s, by "
-                f"{self._seen_by}; the limit is {self._velocity:g} rad/s.",
-                "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
-            )
+            return too_fast(t, velocity, self._velocity, self._seen_by)
         if not abs(position) <= self._position:
-            return TripRequest(
-                "travel",
-                f"Position {position:.2f} rad at t = {t:.3f} s; the limit is {self._position:g} rad.",
-                "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
-            )
+            return too_far(t, position, self._position)
         return None
 
 
@@ -151,18 +140,64 @@ class DisturbanceWatch:
         self._above += 1
         if self._above < self._allowed and filtered == filtered:
             return None
-        figures = (
-            f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {sample.t:.3f} s; "
-            f"the limit is {self._limit:g} rad/s2."
-        )
-        return TripRequest(
-            "disturbance", f"Unknown forces: {figures}", "", explain=partial(self._explanation, figures)
-        )
+        return unknown_forces(sample.t, filtered, self._limit, self._diagnosis.finding)
 
-    def _explanation(self, figures: str) -> Explanation:
-        """Return the likely cause; finding it takes longer than 0 V may wait."""
-        reason, sentence, remedy = self._diagnosis.finding()
-        return Explanation(reason, f"{sentence}: {figures}", remedy)
+
+def not_finite(sample: Sample, estimate: Estimate) -> TripRequest:
+    """Return the request to trip for numbers that are not all finite."""
+    t, position, voltage, _ = sample
+    x1, x2, w = estimate
+    return TripRequest(
+        "not_finite",
+        f"Not every number is finite at t = {t:.3f} s: position {position}, voltage {voltage}, "
+        f"estimate ({x1}, {x2}, {w}).",
+        "Look for a gain that makes the observer diverge, and at the encoder.",
+    )
+
+
+def too_fast(t: float, velocity: float, limit: float, seen_by: str = RUN_OBSERVER) -> TripRequest:
+    """Return the request to trip for an estimated velocity (rad/s) beyond its limit at `t` (s)."""
+    return TripRequest(
+        "speed",
+        f"Estimated velocity {velocity:.2f} rad/s at t = {t:.3f} s, by {seen_by}; the limit is {limit:g} "
+        "rad/s.",
+        "Check motor and encoder polarity, the gains, and supervisor.velocity_limit_rad_s.",
+    )
+
+
+def too_far(t: float, position: float, limit: float) -> TripRequest:
+    """Return the request to trip for a position (rad) beyond its limit at `t` (s)."""
+    return TripRequest(
+        "travel",
+        f"Position {position:.2f} rad at t = {t:.3f} s; the limit is {limit:g} rad.",
+        "Check the reference, the encoder's zero, and supervisor.position_limit_rad.",
+    )
+
+
+def unknown_forces(t: float, filtered: float, limit: float, find: Callable[[], Finding]) -> TripRequest:
+    """Return the request to trip for a disturbance that was too large for too long.
+
+    Parameters
+    ----------
+    t
+        s, device time.
+    filtered
+        rad/s2, mean over 10 ms.
+    limit
+        rad/s2.
+    find
+        Finds the likely cause, which takes longer than 0 V may wait.
+    """
+    figures = (
+        f"{filtered:.0f} rad/s2 unexplained (10 ms mean) at t = {t:.3f} s; the limit is {limit:g} rad/s2."
+    )
+    explain = partial(_explanation, figures, find)
+    return TripRequest("disturbance", f"Unknown forces: {figures}", "", explain=explain)
+
+
+def _explanation(figures: str, find: Callable[[], Finding]) -> Explanation:
+    reason, sentence, remedy = find()
+    return Explanation(reason, f"{sentence}: {figures}", remedy)
 
 
 def filter_keep(period: float) -> float:

@@ -71,10 +71,15 @@ class OutlierFilter:
         if len(self._found) < _OUTLIERS_MAX or self._samples - self._found[0] >= _WINDOW_SAMPLES:
             self.count += 1
             return True
-        self._stop = TripRequest(
-            "jump",
-            f"The position jumped by {sample.position - self._x:+.3f} rad at t = {sample.t:.3f} s, the "
-            f"third jump within {_WINDOW_SAMPLES} samples.",
-            "Look at the encoder's cable, screen and coupling.",
-        )
+        self._stop = jumped(sample.t, sample.position - self._x)
         return False
+
+
+def jumped(t: float, moved: float) -> TripRequest:
+    """Return the request to trip for a third jump, by `moved` (rad) at `t` (s, device time)."""
+    return TripRequest(
+        "jump",
+        f"The position jumped by {moved:+.3f} rad at t = {t:.3f} s, the third jump within {_WINDOW_SAMPLES} "
+        "samples.",
+        "Look at the encoder's cable, screen and coupling.",
+    )

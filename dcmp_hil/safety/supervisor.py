@@ -166,7 +166,7 @@ class Supervisor:
                 break
         try:
             if not _MINUS_INF < demand < _INF:
-                self.stop(_not_finite(sample, demand), t)
+                self.stop(not_finite_demand(t, demand), t)
         except TypeError:  # a bug, not a fault of the rig: no trip, but 0 V all the same on the way out
             raise TypeError(f"The controller returned {demand!r}; update() must return a voltage.") from None
         if not self._has_authority:
@@ -230,12 +230,18 @@ class Supervisor:
         self.stopping, self._stop_from = following is Phase.STOPPING, abs(self._last)
         if following is Phase.TRIPPED and self._cause is not None:
             self.over = self._cause._replace(orderly=event is PhaseEvent.STOPPED)
-        self._notify(Event(t, "INFO", EventKind.PHASE, following.value, PhaseData(following.value)))
+        self._notify(phase_event(t, following))
 
 
-def _not_finite(sample: Sample, demand: float) -> TripRequest:
+def phase_event(t: float, phase: Phase) -> Event:
+    """Return the event of a phase that began at `t` (s, device time)."""
+    return Event(t, "INFO", EventKind.PHASE, phase.value, PhaseData(phase.value))
+
+
+def not_finite_demand(t: float, demand: float) -> TripRequest:
+    """Return the request to trip for a demand (V) that is no finite number, at `t` (s, device time)."""
     return TripRequest(
         "not_finite",
-        f"The controller asked for {demand} V at t = {sample.t:.3f} s.",
+        f"The controller asked for {demand} V at t = {t:.3f} s.",
         "Look for a division by zero or a missing value in the controller.",
     )
