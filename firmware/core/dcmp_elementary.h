@@ -4,12 +4,20 @@
 #ifndef DCMP_ELEMENTARY_H
 #define DCMP_ELEMENTARY_H
 
+#include <stdbool.h>
+
 #include "dcmp_real.h"
 
 /* The absolute value. */
 static inline real dcmp_magnitude(real x)
 {
     return x < REAL(0.0) ? -x : x;
+}
+
+/* Whether it is a number, and no infinity. */
+static inline bool dcmp_is_finite(real x)
+{
+    return x - x == REAL(0.0);
 }
 
 /* The square root, which IEEE 754 defines to the last bit. Compile with -fno-math-errno: then it is one instruction. */

@@ -10,6 +10,7 @@
     }
 
 COLUMN(magnitude, dcmp_magnitude)
+COLUMN(is_finite, dcmp_is_finite)
 COLUMN(square_root, dcmp_square_root)
 COLUMN(nearest, dcmp_nearest)
 COLUMN(floor, dcmp_floor)

@@ -11,6 +11,7 @@
 
 /* dcmp_elementary.h: out = f(x) */
 void CHECK(magnitude)(const double *x, double *out, uint32_t n);
+void CHECK(is_finite)(const double *x, double *out, uint32_t n);
 void CHECK(square_root)(const double *x, double *out, uint32_t n);
 void CHECK(nearest)(const double *x, double *out, uint32_t n);
 void CHECK(floor)(const double *x, double *out, uint32_t n);

@@ -48,6 +48,7 @@ EXPONENTS = _either_way(1e-8, 0.7, 50.0, 800.0, edges=(700.0, math.log(2.0), 0.5
 ROUNDED = _either_way(3.0, 1e6, 2.0**53, edges=tuple(WHOLES))
 CASES: list[tuple[str, Callable[[float], float], Array]] = [
     ("magnitude", abs, np.abs(ROUNDED)),
+    ("is_finite", math.isfinite, ROUNDED),
     ("square_root", _square_root, ROUNDED),
     ("sine", elementary.sine, SINES),
     ("cosine", elementary.cosine, SINES),
@@ -56,7 +57,7 @@ CASES: list[tuple[str, Callable[[float], float], Array]] = [
     ("logarithm", elementary.logarithm, _positive()),
     ("inverse_cube_root", elementary.inverse_cube_root, np.append(_positive(), math.nan)),
 ]
-WANTED = {name: np.array([function(x) for x in given.tolist()]) for name, function, given in CASES}
+WANTED = {name: np.array([float(function(x)) for x in given.tolist()]) for name, function, given in CASES}
 
 
 @pytest.mark.parametrize(("name", "given"), [(name, given) for name, _, given in CASES])
