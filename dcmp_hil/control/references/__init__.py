@@ -3,10 +3,14 @@
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Protocol
 
+import numpy as np
 from pydantic import Field
 
 from dcmp_hil.common.section import Section
 from dcmp_hil.values import Reference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _REFERENCE_POINTS = 2000  # instants at which a reference without peaks of its own is looked at
 
@@ -17,6 +21,14 @@ class Peaks(NamedTuple):
     position: float  # rad
     velocity: float  # rad/s
     acceleration: float  # rad/s2
+
+
+class References(NamedTuple):
+    """References at n instants, each of shape (n,)."""
+
+    position: "NDArray[np.float64]"  # rad
+    velocity: "NDArray[np.float64]"  # rad/s
+    acceleration: "NDArray[np.float64]"  # rad/s2
 
 
 class ReferenceSource(Protocol):
@@ -51,6 +63,14 @@ class ReferenceSettings(Section, ABC):
         """Return what the loop evaluates in every cycle; its values are those of `at`, to the bit."""
         return self
 
+    def at_each(self, t: "NDArray[np.float64]") -> References:
+        """Return the references at many instants, s after the start; the values of `at`, to the bit.
+
+        A kind that has a faster way than `at` for each of them overrides it.
+        """
+        at = self.source().at
+        return References(*np.array([at(one) for one in t.tolist()], float).reshape(-1, 3).T)
+
     def peaks(self, length: float) -> Peaks:
         """Return what it asks for once it has faded in, in the first `length` seconds."""
         looks = [self.at(length * k / _REFERENCE_POINTS) for k in range(_REFERENCE_POINTS + 1)]
@@ -63,4 +83,4 @@ class ReferenceSettings(Section, ABC):
         return tuple(keys) if cls.in_run else ("kind",)
 
 
-__all__ = ["Peaks", "ReferenceSettings", "ReferenceSource"]
+__all__ = ["Peaks", "ReferenceSettings", "ReferenceSource", "References"]

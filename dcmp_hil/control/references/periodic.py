@@ -1,12 +1,28 @@
 """References that swing: a sine and a chirp."""
 
+from __future__ import annotations
+
 import math
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
 
 from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.references import Peaks, ReferenceSettings
+from dcmp_hil.control.references import Peaks, References, ReferenceSettings
 from dcmp_hil.values import Reference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Vector = NDArray[np.float64]
+
+
+def _sine_and_cosine(angle: Vector) -> tuple[Vector, Vector]:
+    """Return both, by the functions of `math`: those of numpy have other last bits on some processors."""
+    angles = angle.tolist()
+    count = len(angles)
+    return np.fromiter(map(math.sin, angles), float, count), np.fromiter(map(math.cos, angles), float, count)
 
 
 class SineWave(NamedTuple):
@@ -50,6 +66,13 @@ class Sine(ReferenceSettings):
         """Return the sine without pydantic, for the loop."""
         return SineWave(self.amplitude_rad, self.rate_rad_s, self.phase_rad, self.offset_rad)
 
+    def at_each(self, t: Vector) -> References:
+        """Return the references at many instants, s after the start."""
+        amplitude, rate, phase, offset = self.source()
+        sine, cosine = _sine_and_cosine(rate * t + phase)
+        swing = amplitude * sine
+        return References(offset + swing, amplitude * rate * cosine, -rate * rate * swing)
+
     def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - at some time it asks for all of it
         """Return what it asks for at most."""
         amplitude, rate = self.amplitude_rad, self.rate_rad_s
@@ -80,6 +103,19 @@ class Chirp(ReferenceSettings):
         rate = 2 * math.pi * (self.from_hz + slope * t if t < self.sweep_s else self.to_hz)
         sine, cosine = self.amplitude_rad * math.sin(angle), self.amplitude_rad * math.cos(angle)
         return Reference(
+            self.offset_rad + sine, rate * cosine, 2 * math.pi * slope * cosine - rate * rate * sine
+        )
+
+    def at_each(self, t: Vector) -> References:
+        """Return the references at many instants, s after the start."""
+        sweeps = t < self.sweep_s
+        slope = np.where(sweeps, (self.to_hz - self.from_hz) / self.sweep_s, 0.0)
+        swept = np.minimum(t, self.sweep_s)
+        turns = swept * (self.from_hz + 0.5 * (self.to_hz - self.from_hz) * swept / self.sweep_s)
+        sine, cosine = _sine_and_cosine(2 * math.pi * (turns + self.to_hz * (t - swept)))
+        rate = 2 * math.pi * np.where(sweeps, self.from_hz + slope * t, self.to_hz)
+        sine, cosine = self.amplitude_rad * sine, self.amplitude_rad * cosine
+        return References(
             self.offset_rad + sine, rate * cosine, 2 * math.pi * slope * cosine - rate * rate * sine
         )
 

@@ -1,11 +1,20 @@
 """References made of pieces: hold, step, trapezoid."""
 
+from __future__ import annotations
+
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from dcmp_hil.common.section import NotNegative, Positive
-from dcmp_hil.control.references import Peaks, ReferenceSettings
+from dcmp_hil.control.references import Peaks, References, ReferenceSettings
 from dcmp_hil.values import Reference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Vector = NDArray[np.float64]
 
 
 class Hold(ReferenceSettings):
@@ -18,6 +27,11 @@ class Hold(ReferenceSettings):
     def at(self, t: float) -> Reference:  # noqa: ARG002 - the same at every instant
         """Return the reference `t` seconds after the start."""
         return Reference(self.position_rad, 0.0, 0.0)
+
+    def at_each(self, t: Vector) -> References:
+        """Return the references at many instants, s after the start."""
+        rest = np.zeros(len(t))
+        return References(np.full(len(t), self.position_rad), rest, rest)
 
     def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - the same at every instant
         """Return what it asks for at most."""
@@ -38,6 +52,11 @@ class Step(ReferenceSettings):
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
         return Reference(self.after_rad if t >= self.at_s else self.before_rad, 0.0, 0.0)
+
+    def at_each(self, t: Vector) -> References:
+        """Return the references at many instants, s after the start."""
+        rest = np.zeros(len(t))
+        return References(np.where(t >= self.at_s, self.after_rad, self.before_rad), rest, rest)
 
     def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - before and after the step
         """Return what it asks for at most; the step itself is bounded by the governor."""
@@ -62,18 +81,35 @@ class Trapezoid(ReferenceSettings):
     def at(self, t: float) -> Reference:
         """Return the reference `t` seconds after the start."""
         distance = self.high_rad - self.low_rad
+        ramp, move = self._times(distance)
+        if ramp == 0.0:
+            return Reference(self.low_rad, 0.0, 0.0)
+        there, into = divmod(max(t, 0.0), move + self.rest_s)
+        start, way = (self.low_rad, distance) if there % 2 == 0 else (self.high_rad, -distance)
+        x, v, a = trapezoid(min(into / move, 1.0), ramp / move)
+        return Reference(start + way * x, way * v / move, way * a / move**2)
+
+    def at_each(self, t: Vector) -> References:
+        """Return the references at many instants, s after the start."""
+        distance = self.high_rad - self.low_rad
+        ramp, move = self._times(distance)
+        if ramp == 0.0:
+            rest = np.zeros(len(t))
+            return References(np.full(len(t), self.low_rad), rest, rest)
+        there, into = np.divmod(np.maximum(t, 0.0), move + self.rest_s)
+        goes = there % 2 == 0
+        start, way = np.where(goes, self.low_rad, self.high_rad), np.where(goes, distance, -distance)
+        x, v, a = trapezoids(np.minimum(into / move, 1.0), ramp / move)
+        return References(start + way * x, way * v / move, way * a / move**2)
+
+    def _times(self, distance: float) -> tuple[float, float]:
+        """Return the lengths of a ramp and of a move, s, over a distance (rad); 0 and 0 for no distance."""
         # A move too short for the full velocity is a triangle.
         ramp = min(
             self.velocity_rad_s / self.acceleration_rad_s2,
             math.sqrt(abs(distance) / self.acceleration_rad_s2),
         )
-        if ramp == 0.0:
-            return Reference(self.low_rad, 0.0, 0.0)
-        move = ramp + abs(distance) / (self.acceleration_rad_s2 * ramp)
-        there, into = divmod(max(t, 0.0), move + self.rest_s)
-        start, way = (self.low_rad, distance) if there % 2 == 0 else (self.high_rad, -distance)
-        x, v, a = trapezoid(min(into / move, 1.0), ramp / move)
-        return Reference(start + way * x, way * v / move, way * a / move**2)
+        return (ramp, ramp + abs(distance) / (self.acceleration_rad_s2 * ramp)) if ramp else (0.0, 0.0)
 
     def peaks(self, length: float) -> Peaks:  # noqa: ARG002 - a move is judged as a whole
         """Return what it asks for at most."""
@@ -110,3 +146,16 @@ def trapezoid(s: float, ramp: float) -> tuple[float, float, float]:
         left = 1.0 - s
         return 1.0 - 0.5 * steep * left * left, steep * left, -steep
     return top * (s - 0.5 * ramp), top, 0.0
+
+
+def trapezoids(s: Vector, ramp: float) -> tuple[Vector, Vector, Vector]:
+    """Return `trapezoid` of many `s`, each of shape (n,)."""
+    top = 1.0 / (1.0 - ramp)
+    steep = top / ramp
+    left = 1.0 - s
+    cases = [s <= 0.0, s >= 1.0, s < ramp, s > 1.0 - ramp]
+    x = np.select(
+        cases, [0.0, 1.0, 0.5 * steep * s * s, 1.0 - 0.5 * steep * left * left], top * (s - 0.5 * ramp)
+    )
+    v = np.select(cases, [0.0, 0.0, steep * s, steep * left], top)
+    return x, v, np.select(cases, [0.0, 0.0, steep, -steep], 0.0)

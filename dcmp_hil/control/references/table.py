@@ -5,14 +5,18 @@ from __future__ import annotations
 from bisect import bisect_right
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from dcmp_hil.common.csv import read_columns
-from dcmp_hil.control.references import ReferenceSettings
+from dcmp_hil.control.references import References, ReferenceSettings
 from dcmp_hil.errors import ConfigError
 from dcmp_hil.values import Reference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _ROWS_MIN = 2
 
@@ -35,6 +39,19 @@ class Table(ReferenceSettings):
             return Reference(((c3 * s + c2) * s + c1) * s + c0, 0.0, 0.0)
         return Reference(
             ((c3 * s + c2) * s + c1) * s + c0, (3 * c3 * s + 2 * c2) * s + c1, 6 * c3 * s + 2 * c2
+        )
+
+    def at_each(self, t: NDArray[np.float64]) -> References:
+        """Return the references at many instants, s after the start."""
+        knots, pieces = map(np.array, self._spline)
+        k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(pieces) - 1)
+        s = np.minimum(np.maximum(t, knots[0]), knots[-1]) - knots[k]
+        c3, c2, c1, c0 = pieces[k].T
+        inside = (knots[0] <= t) & (t <= knots[-1])
+        return References(
+            ((c3 * s + c2) * s + c1) * s + c0,
+            np.where(inside, (3 * c3 * s + 2 * c2) * s + c1, 0.0),
+            np.where(inside, 6 * c3 * s + 2 * c2, 0.0),
         )
 
     @cached_property
