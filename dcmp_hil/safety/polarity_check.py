@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from dcmp_hil.safety.diagnosis import moved_by
-from dcmp_hil.trip_request import TripRequest
+from dcmp_hil.safety import polarity_refusals
+from dcmp_hil.safety.motor_gain_fit import MotorGainFit
 from dcmp_hil.values import Event, EventKind, ProbeData
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from dcmp_hil.control.model import Model
+    from dcmp_hil.trip_request import TripRequest
     from dcmp_hil.values import Sample
 
 REST_TIME_S = 0.1  # s at 0 V: is the arm at rest
@@ -33,9 +30,6 @@ _VOLTAGE_SHARE_MIN = 0.6  # of the voltage asked for, that must be applied: fric
 _GAIN_RATIO_MAX = 3.0  # measured over believed motor gain, either way, beyond which the probe refuses
 _GAIN_RATIO_WARNING = 1.25  # beyond which it warns
 _SIGNIFICANCE_DEVIATIONS = 4.0  # standard deviations
-_NOISE_COUNTS, _NOISE_MIN_RAD = 0.4, 1e-4  # counts and rad, of a position
-_DISTURBANCE_RAD_S2 = 2.0  # rad/s2, what may push besides
-_MOTOR_GAIN_RATIO_MAX = 3.0  # times the believed motor gain
 _PUSH_TRAVEL_MIN_COUNTS = 2.0  # counts that a push must be expected to move the arm by
 
 
@@ -114,10 +108,11 @@ class PolarityCheck:
         *,
         gravity: float = 0.0,
     ) -> None:
-        self._ku, self._push, self._count, self._gravity = ku, voltage, count, gravity
+        self._ku, self._push, self._count = ku, voltage, count
         self._began = math.nan  # s, of the present stage
         self._x0 = math.nan  # rad, where the arm was as the stage of watching, and then the pushes, began
-        self._seen: list[tuple[float, float, float]] = []  # s and rad since the pushes began, V applied
+        self._fit = MotorGainFit(ku, gravity, count)
+        self._up = self._reached = 0.0  # rad, the way of the first push; V, either way, applied at most
         self._notify = notify
         self.found: MotorGain | None = None
         self._length = math.nan  # s, of the first push
@@ -139,13 +134,9 @@ class PolarityCheck:
 
         Reasons are ``moving``, ``power``, ``slew``, ``polarity``, ``gain`` and ``not_finite``.
         """
-        if not math.isfinite(sample.t + sample.position + sample.voltage):
-            return TripRequest(
-                "not_finite",
-                f"Not every number is finite while the arm is probed: position {sample.position}, voltage "
-                f"{sample.voltage}, t = {sample.t:.3f} s.",
-                "Look at the encoder, and at the class that is the backend.",
-            )
+        t, position, voltage, _ = sample
+        if not math.isfinite(t + position + voltage):
+            return polarity_refusals.not_finite(t, position, voltage)
         if math.isnan(self._began):
             self._began, self._x0 = sample.t, sample.position
         return self._stage(sample.t - self._began, sample)
@@ -153,20 +144,16 @@ class PolarityCheck:
     def _watch(self, since: float, sample: Sample) -> TripRequest | None:
         moved = sample.position - self._x0
         if not -_REST_TRAVEL_MAX_RAD <= moved <= _REST_TRAVEL_MAX_RAD:
-            return TripRequest(
-                "moving",
-                f"The arm moves by itself: {moved:+.3f} rad in {since:.3f} s at 0 V.",
-                'Bring it to rest, hanging, and start again; supervisor.probe = "off" starts without it.',
-            )
+            return polarity_refusals.moves(moved, since)
         if since >= REST_TIME_S:
             self._began, self._x0 = sample.t, sample.position
-            self._seen = [(0.0, sample.position, 0.0)]
+            self._fit.add(0.0, 0.0, 0.0)
             self._stage, self.voltage = self._push_up, self._push
         return None
 
     def _push_up(self, since: float, sample: Sample) -> TripRequest | None:
-        self._seen.append((since, sample.position, sample.voltage))
-        moved = abs(sample.position - self._x0)
+        way = self._see(since, sample)
+        moved = abs(way)
         if not abs(sample.voltage) >= _VOLTAGE_RISEN_SHARE * self._push:
             self._rise = since
         coasting = _COASTING_SPEED_RATIO * moved / since * self._rise if since > 0.0 else 0.0
@@ -175,87 +162,46 @@ class PolarityCheck:
             and moved < _PUSH_TRAVEL_MAX_RAD
             and moved + coasting < _COASTING_TRAVEL_MAX_RAD
         ):
-            self._length, self._began = since, sample.t
+            self._up, self._length, self._began = way, since, sample.t
             self._stage, self.voltage = self._push_down, -self._push
         return None
 
     def _push_down(self, since: float, sample: Sample) -> TripRequest | None:
-        self._seen.append((self._length + since, sample.position, sample.voltage))
-        if since < self._length and abs(sample.position - self._x0) < _RETURN_TRAVEL_MAX_RAD:
+        moved = self._see(self._length + since, sample)
+        if since < self._length and abs(moved) < _RETURN_TRAVEL_MAX_RAD:
             return None
-        stop = self._judge(np.array(self._seen).T)
+        stop = self._judge(moved - self._up)
         self.over = stop is None
         if self.over and self._notify and self.found:
             self._notify(self.found.told(sample.t))
         return stop
 
-    @np.errstate(all="ignore")  # what overflows is far from any gain, and is refused
-    def _judge(self, seen: NDArray[np.float64]) -> TripRequest | None:
+    def _see(self, since: float, sample: Sample) -> float:
+        """Take in a sample of a push, `since` the pushes began (s); return the way from there, rad."""
+        moved = sample.position - self._x0
+        self._fit.add(since, moved, sample.voltage)
+        self._reached = max(self._reached, abs(sample.voltage))
+        return moved
+
+    def _judge(self, down: float) -> TripRequest | None:
         """Compare the measured motor gain with the believed one; an encoder's step is given the benefit."""
-        moved = seen[1] - self._x0
-        up, farthest = (
-            moved[min(np.searchsorted(seen[0], self._length), len(moved) - 1)],
-            float(np.abs(moved).max()),
-        )
-        gain, deviation = self._gain(seen[0], moved, seen[2])
+        gain, deviation = self._fit.gain()
         self.found = MotorGain(gain, deviation, self._ku)
         unsure = _SIGNIFICANCE_DEVIATIONS * deviation
-        volts, down = f"{self._push:g} V", moved[-1] - up
-        said = f"+{volts} moved the arm by {up:+.4f} rad, -{volts} by {down:+.4f} rad"
-        unclear = not gain - unsure > 0.0 and gain + unsure > 0.0
-        reached = float(np.abs(seen[2]).max())
-        if (not farthest > self._count or unclear) and not reached >= _VOLTAGE_SHARE_MIN * self._push:
-            return self._too_slow(reached)
-        if not farthest > self._count:
-            return TripRequest(
-                "power",
-                f"The arm does not answer: {said}.",
-                "Look at motor supply, e-stop and ENABLE, at the coupling, and at the encoder's cable.",
-            )
-        if not gain + unsure > 0.0:
-            return TripRequest(
-                "polarity",
-                f"The arm goes the wrong way: {said}.",
-                "Change amplifier.sign, or encoder.sign if the count falls when you lift the arm by hand.",
-            )
-        if not gain - unsure > 0.0:
-            return TripRequest(
-                "power",
-                f"The arm hardly answers, too little to tell which way: {said}.",
-                'Look what holds it, and at the motor supply; supervisor.probe = "off" starts without.',
-            )
-        if not (gain + unsure > self._ku / _GAIN_RATIO_MAX and gain - unsure < self._ku * _GAIN_RATIO_MAX):
-            return TripRequest(
-                "gain",
-                f"The arm answers {gain / self._ku:.2g} times as strongly as [model] says: {said}.",
-                "Look at encoder.counts_per_rev (after quadrature), at the gear, and at model.ku_rad_s2_V.",
-            )
+        least, most = gain - unsure, gain + unsure
+        still, unclear = not self._fit.farthest > self._count, not least > 0.0 and most > 0.0
+        ways = self._push, self._up, down
+        if (still or unclear) and not self._reached >= _VOLTAGE_SHARE_MIN * self._push:
+            return polarity_refusals.too_slow(self._reached, self._push, self._length)
+        if still:
+            return polarity_refusals.no_answer(*ways)
+        if not most > 0.0:
+            return polarity_refusals.wrong_way(*ways)
+        if unclear:
+            return polarity_refusals.unsure(*ways)
+        if not (most > self._ku / _GAIN_RATIO_MAX and least < self._ku * _GAIN_RATIO_MAX):
+            return polarity_refusals.off(*ways, self.found.ratio)
         return None
-
-    def _too_slow(self, reached: float) -> TripRequest:
-        """Return the TripRequest for an amplifier whose output was too low to move the arm."""
-        return TripRequest(
-            "slew",
-            f"The amplifier put out {reached:.2g} V of the {self._push:g} V asked for in "
-            f"{self._length:.2g} s, too little to move the arm.",
-            "Look at the slew limit of the device and at amplifier.slew_V_s: 20 V/s and more would do.",
-        )
-
-    def _gain(
-        self, t: NDArray[np.float64], moved: NDArray[np.float64], applied: NDArray[np.float64]
-    ) -> tuple[float, float]:
-        """Fit the motor's gain and a constant push to the way out: until it turns, friction is constant."""
-        out = int(np.flatnonzero(np.abs(moved) == np.abs(moved).max())[-1]) + 1
-        t, moved, applied = t[:out], moved[:out], applied[:out]
-        columns = np.column_stack([np.ones_like(t), 0.5 * t * t, moved_by(t, applied)])
-        noise = math.hypot(_NOISE_COUNTS * self._count, _NOISE_MIN_RAD)
-        usual = np.array(
-            [max(self._count, _NOISE_MIN_RAD), _DISTURBANCE_RAD_S2, _MOTOR_GAIN_RATIO_MAX * self._ku]
-        )
-        covariance = np.linalg.inv(columns.T @ columns / noise**2 + np.diag(usual**-2))
-        moved = moved + moved_by(t, self._gravity * np.sin(moved))  # as if it did not fall
-        gain = (covariance @ columns.T @ moved)[2] / noise**2
-        return float(gain), float(np.sqrt(covariance[2, 2]))
 
 
 def probe_for(

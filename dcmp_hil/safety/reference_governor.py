@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from dcmp_hil.control.elementary import exponential
 from dcmp_hil.values import Reference
 
 _BRAKING_ACCELERATION_SHARE = 0.7
@@ -116,25 +117,27 @@ class ReferenceGovernor:
     def _led(self, dt: float, reference: Reference) -> Reference:
         """Move on in steps of a few milliseconds, however long the period was."""
         dt = min(dt, _GAP_MAX_S)
-        if not math.isfinite(sum(reference)):
+        x, v, a = reference
+        if not math.isfinite(x + v + a):
             return reference
         if self._met(reference):
             self.leads = False
             self.last = reference
             return reference
         steps = max(1, math.ceil(dt / _INTEGRATION_STEP_S))
+        dt /= steps
+        smooth = exponential(-dt / _ACCELERATION_LAG_S)
         for _ in range(steps):
-            self.last = self._lead(dt / steps, reference)
+            self.last = self._lead(dt, smooth, reference)
         return self.last
 
-    def _lead(self, dt: float, reference: Reference) -> Reference:
+    def _lead(self, dt: float, smooth: float, reference: Reference) -> Reference:
         """Move on by `dt`, towards the reference where it is inside, towards the bound where it is not."""
         x, v, a = self.last
         target, speed, push = reference
         if not (abs(target) <= self._x and abs(speed) <= self._v and abs(push) <= self._a):
             target, speed, push = min(max(target, -self._x), self._x), 0.0, 0.0
         wanted = self._wanted(x, v, target, speed, push)
-        smooth = math.exp(-dt / _ACCELERATION_LAG_S)
         a = wanted + smooth * (a - wanted)
         x, v = x + dt * (v + 0.5 * dt * a), v + dt * a
         if abs(v) > self._v:
