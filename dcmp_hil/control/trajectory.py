@@ -119,9 +119,10 @@ def fade(since: float, length: float) -> tuple[float, float, float]:
         s, of the soft start.
     """
     s = max(since / length, 0.0)
+    left = 1.0 - s
     gone = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-    gone1 = 30.0 * s * s * (1.0 - s) ** 2 / length
-    gone2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length)
+    gone1 = 30.0 * s * s * (left * left) / length
+    gone2 = 60.0 * s * left * (1.0 - 2.0 * s) / (length * length)
     return gone, gone1, gone2
 
 

@@ -56,3 +56,12 @@ void CHECK(random)(uint64_t seed, uint32_t stream, const double *counters, doubl
 void CHECK(plant)(const double *setup, uint32_t steps, const double *voltages, double *out, uint32_t n);
 void CHECK(encoder)(const double *setup, const double *rows, double *out, uint32_t n); /* position, normal */
 void CHECK(amplifier)(const double *setup, const double *commands, double *out, uint32_t n);
+
+/* dcmp_trajectory.h: rows of ticks with the reference's x v a at `later` after the tick, at the tick before it and in the middle; the
+ * trajectory begins at tick `begins` from x0. Of each row come out the three references. */
+void CHECK(trajectory)(const double *setup, const double *rows, double *out, uint32_t n);
+
+/* dcmp_run_phases.h: rows of tick, objection of the checks, demand, refusal, end and voltage of the polarity check, objection of the
+ * limits. Of each row come out voltage, phase, whether the trajectory begins, over, orderly, cause and its tick, number of notes,
+ * and the phase of the last note. */
+void CHECK(phases)(const double *setup, const double *rows, double *out, uint32_t n);

@@ -106,6 +106,7 @@ struct run_parameters {
     double reference_a_max;    /* rad/s2, Bounds.acceleration */
     double reference_braking;  /* rad/s2, Bounds.braking */
     double reference_strongest; /* rad/s2, Bounds.strongest */
+    double reference_stop;     /* s2/rad, Bounds.stop */
     double position_max;       /* rad */
     double velocity_max;       /* rad/s, RangeMonitor.velocity_max: with its spare */
     double disturbance_max;    /* rad/s2 */

@@ -1,0 +1,235 @@
+/* The phases of a run and its authority: dcmp_hil/safety/supervisor.py, with the same conditions in the same order.
+ * What the checks find, the limits make and the polarity check wants are the caller's, who hands them in. */
+#ifndef DCMP_RUN_PHASES_H
+#define DCMP_RUN_PHASES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "dcmp_cause.h"
+#include "dcmp_elementary.h"
+#include "dcmp_time.h"
+
+enum dcmp_run_phase {
+    DCMP_RUN_ARMING = 0,
+    DCMP_RUN_PROBING = 1,
+    DCMP_RUN_SETTLING = 2,
+    DCMP_RUN_ENGAGING = 3,
+    DCMP_RUN_RUNNING = 4,
+    DCMP_RUN_STOPPING = 5,
+    DCMP_RUN_TRIPPED = 6
+};
+
+struct dcmp_phases_setup {
+    real period;        /* s */
+    real settle;        /* s at 0 V */
+    real engage;        /* s, over which authority grows */
+    real voltage_limit; /* V, either way */
+    real slew;          /* V a period; infinity for none */
+    bool probes;        /* there is a polarity check */
+};
+
+/* All 0 at the start. */
+struct dcmp_phases {
+    int64_t since; /* tick at which the present phase began */
+    enum dcmp_run_phase phase;
+    bool over;    /* 0 V for good */
+    bool orderly; /* the voltage was led there */
+    real push;    /* V, of the polarity check */
+    real last;    /* V, what was sent last */
+    real stop_from; /* V, where an orderly end begins */
+    struct dcmp_objection refusal; /* of the polarity check */
+    struct dcmp_objection cause;   /* the first */
+};
+
+#define DCMP_RAMP_TIME REAL(0.05) /* s that an orderly end takes to 0 V */
+
+/* What a cycle has to tell, in its order; a cycle has fewer than there are places. */
+#define DCMP_NOTES_MAX 16u
+
+enum dcmp_note_code {
+    DCMP_NOTE_PHASE = 1,        /* first: the new phase */
+    DCMP_NOTE_PROBE = 2,        /* first, second: gain and its deviation, (rad/s2)/V */
+    DCMP_NOTE_POSITION = 3,     /* of the reference; first, second: limit and what was asked for */
+    DCMP_NOTE_VELOCITY = 4,     /* the same */
+    DCMP_NOTE_ACCELERATION = 5, /* the same */
+    DCMP_NOTE_WAY = 6,          /* first: where the arm is led to, rad */
+    DCMP_NOTE_VOLTAGE = 7,      /* first, second: asked for and allowed, V */
+    DCMP_NOTE_SLEW = 8          /* first, second: asked for and the last one sent, V */
+};
+
+struct dcmp_note {
+    enum dcmp_note_code code;
+    real first;
+    real second;
+};
+
+struct dcmp_notes {
+    struct dcmp_note note[DCMP_NOTES_MAX];
+    uint32_t count;
+};
+
+static inline void dcmp_tell(struct dcmp_notes *notes, enum dcmp_note_code code, real first, real second)
+{
+    const struct dcmp_note note = {code, first, second};
+    notes->note[notes->count % DCMP_NOTES_MAX] = note;
+    notes->count++;
+}
+
+/* Whether there is full authority: the limits have the last word. */
+static inline bool dcmp_has_authority(const struct dcmp_phases *now)
+{
+    return now->phase == DCMP_RUN_RUNNING;
+}
+
+static inline void dcmp_phases_enter(struct dcmp_phases *now, enum dcmp_run_phase next, int64_t tick,
+                                     struct dcmp_notes *notes)
+{
+    now->phase = next;
+    now->since = tick;
+    now->stop_from = dcmp_magnitude(now->last);
+    dcmp_tell(notes, DCMP_NOTE_PHASE, REAL((int32_t)next), REAL(0.0));
+}
+
+/* Begin to end the run at a tick; the first cause stays. */
+static inline void dcmp_phases_stop(struct dcmp_phases *now, struct dcmp_objection objection, int64_t tick,
+                                    struct dcmp_notes *notes)
+{
+    const bool leads = now->phase == DCMP_RUN_ENGAGING || now->phase == DCMP_RUN_RUNNING;
+    const bool led = now->phase == DCMP_RUN_STOPPING;
+    if (now->cause.cause == DCMP_CAUSE_NONE) {
+        now->cause = objection;
+    }
+    if (now->phase == DCMP_RUN_TRIPPED) {
+        return;
+    }
+    if (!dcmp_leaves_time(objection.cause)) {
+        dcmp_phases_enter(now, DCMP_RUN_TRIPPED, tick, notes);
+        now->over = true;
+    } else if (leads) {
+        dcmp_phases_enter(now, DCMP_RUN_STOPPING, tick, notes);
+    } else if (!led) {
+        dcmp_phases_enter(now, DCMP_RUN_TRIPPED, tick, notes); /* nothing to lead to 0 V */
+        now->over = true;
+    } else {
+        /* It is on its way. */
+    }
+}
+
+/* Leave ARMING with the first sample. */
+static inline void dcmp_phases_arm(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
+                                   struct dcmp_notes *notes)
+{
+    if (now->phase == DCMP_RUN_ARMING) {
+        dcmp_phases_enter(now, setup->probes ? DCMP_RUN_PROBING : DCMP_RUN_SETTLING, tick, notes);
+    }
+}
+
+/* What the polarity check says of a sample in PROBING. */
+struct dcmp_probe_answer {
+    struct dcmp_objection refusal;
+    bool over;    /* and all is well */
+    real voltage; /* V, that it wants */
+};
+
+/* Go on probing. A refusal waits for what the checks find in this cycle: a jump is no motion of the arm. */
+static inline void dcmp_phases_probed(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
+                                      struct dcmp_probe_answer answer, struct dcmp_notes *notes)
+{
+    const real most = setup->voltage_limit;
+    if (answer.refusal.cause != DCMP_CAUSE_NONE) {
+        now->refusal = answer.refusal;
+    } else if (answer.over) {
+        dcmp_phases_enter(now, DCMP_RUN_SETTLING, tick, notes);
+    } else {
+        const real below = answer.voltage < most ? answer.voltage : most;
+        now->push = below > -most ? below : -most;
+    }
+}
+
+/* Leave SETTLING in time; whether the trajectory begins. */
+static inline bool dcmp_phases_settled(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
+                                       struct dcmp_notes *notes)
+{
+    if (now->phase == DCMP_RUN_SETTLING && dcmp_elapsed(now->since, tick, setup->period) >= setup->settle) {
+        dcmp_phases_enter(now, DCMP_RUN_ENGAGING, tick, notes);
+        return true;
+    }
+    return false;
+}
+
+/* Leave PROBING where the polarity check has refused, ENGAGING with full authority, STOPPING with none. */
+static inline void dcmp_phases_leave(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
+                                     struct dcmp_notes *notes)
+{
+    if (now->refusal.cause != DCMP_CAUSE_NONE) {
+        dcmp_phases_stop(now, now->refusal, tick, notes);
+    }
+    const real gone = dcmp_elapsed(now->since, tick, setup->period);
+    if (now->phase == DCMP_RUN_ENGAGING && gone >= setup->engage) {
+        dcmp_phases_enter(now, DCMP_RUN_RUNNING, tick, notes);
+    } else if (now->phase == DCMP_RUN_STOPPING && gone >= DCMP_RAMP_TIME) {
+        dcmp_phases_enter(now, DCMP_RUN_TRIPPED, tick, notes);
+        now->over = true;
+        now->orderly = true;
+    } else {
+        /* It stays. */
+    }
+}
+
+/* What the checks of a cycle object to, then what the controller asks for, then time. */
+static inline void dcmp_phases_judge(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
+                                     struct dcmp_objection objection, real demand, struct dcmp_notes *notes)
+{
+    if (objection.cause != DCMP_CAUSE_NONE) {
+        dcmp_phases_stop(now, objection, tick, notes);
+    }
+    if (!(demand - demand == REAL(0.0))) {
+        const struct dcmp_objection no_number = {tick, DCMP_CAUSE_DEMAND, demand, REAL(0.0)};
+        dcmp_phases_stop(now, no_number, tick, notes);
+    }
+    if (!dcmp_has_authority(now)) {
+        dcmp_phases_leave(now, setup, tick, notes);
+    }
+}
+
+/* The voltage in every phase but RUNNING, V. */
+static inline real dcmp_partial_voltage(const struct dcmp_phases *now, const struct dcmp_phases_setup *setup,
+                                        int64_t tick, real demand)
+{
+    const real gone = dcmp_elapsed(now->since, tick, setup->period);
+    real most = REAL(0.0);
+    if (now->phase == DCMP_RUN_PROBING) {
+        return now->push;
+    }
+    if (now->phase == DCMP_RUN_ENGAGING && gone > REAL(0.0)) { /* at 0 an infinite limit would give NaN */
+        most = setup->voltage_limit * gone / setup->engage;
+    } else if (now->phase == DCMP_RUN_STOPPING) {
+        most = now->stop_from * (REAL(1.0) - gone / DCMP_RAMP_TIME);
+    } else {
+        /* 0 V */
+    }
+    if (!(most > REAL(0.0))) {
+        return REAL(0.0);
+    }
+    const real highest = now->last + setup->slew;
+    const real lowest = now->last - setup->slew;
+    const real below = demand < most ? demand : most;
+    const real within = below > -most ? below : -most;
+    const real slower = within < highest ? within : highest;
+    return slower > lowest ? slower : lowest;
+}
+
+/* What is sent, V: it was limited, and the limits may object. Without authority nothing is to be led to 0 V. */
+static inline real dcmp_phases_send(struct dcmp_phases *now, real voltage, struct dcmp_objection objection, int64_t tick,
+                                    struct dcmp_notes *notes)
+{
+    now->last = voltage;
+    if (objection.cause != DCMP_CAUSE_NONE) {
+        dcmp_phases_stop(now, objection, tick, notes);
+        now->last = now->over ? REAL(0.0) : voltage;
+    }
+    return now->last;
+}
+
+#endif

@@ -1,0 +1,2 @@
+#define DCMP_REAL_FLOAT
+#include "run_phases_checks.c"
