@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "dcmp_cause.h"
-#include "dcmp_elementary.h"
+#include "dcmp_limiter.h"
 #include "dcmp_time.h"
 
 enum dcmp_run_phase {
@@ -48,18 +48,13 @@ struct dcmp_phases {
 #define DCMP_NOTES_MAX 16u
 
 enum dcmp_note_code {
-    DCMP_NOTE_PHASE = 1,        /* first: the new phase */
-    DCMP_NOTE_PROBE = 2,        /* first, second: gain and its deviation, (rad/s2)/V */
-    DCMP_NOTE_POSITION = 3,     /* of the reference; first, second: limit and what was asked for */
-    DCMP_NOTE_VELOCITY = 4,     /* the same */
-    DCMP_NOTE_ACCELERATION = 5, /* the same */
-    DCMP_NOTE_WAY = 6,          /* first: where the arm is led to, rad */
-    DCMP_NOTE_VOLTAGE = 7,      /* first, second: asked for and allowed, V */
-    DCMP_NOTE_SLEW = 8          /* first, second: asked for and the last one sent, V */
+    DCMP_NOTE_PHASE = 1, /* first: the new phase */
+    DCMP_NOTE_PROBE = 2, /* first, second: gain and its deviation, (rad/s2)/V */
+    DCMP_NOTE_LIMIT = 2  /* plus enum dcmp_limit, 1 to 6; first, second: as there */
 };
 
 struct dcmp_note {
-    enum dcmp_note_code code;
+    int32_t code;
     real first;
     real second;
 };
@@ -69,7 +64,7 @@ struct dcmp_notes {
     uint32_t count;
 };
 
-static inline void dcmp_tell(struct dcmp_notes *notes, enum dcmp_note_code code, real first, real second)
+static inline void dcmp_tell(struct dcmp_notes *notes, int32_t code, real first, real second)
 {
     const struct dcmp_note note = {code, first, second};
     notes->note[notes->count % DCMP_NOTES_MAX] = note;
@@ -88,7 +83,7 @@ static inline void dcmp_phases_enter(struct dcmp_phases *now, enum dcmp_run_phas
     now->phase = next;
     now->since = tick;
     now->stop_from = dcmp_magnitude(now->last);
-    dcmp_tell(notes, DCMP_NOTE_PHASE, REAL((int32_t)next), REAL(0.0));
+    dcmp_tell(notes, (int32_t)DCMP_NOTE_PHASE, REAL((int32_t)next), REAL(0.0));
 }
 
 /* Begin to end the run at a tick; the first cause stays. */
@@ -136,14 +131,12 @@ struct dcmp_probe_answer {
 static inline void dcmp_phases_probed(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
                                       struct dcmp_probe_answer answer, struct dcmp_notes *notes)
 {
-    const real most = setup->voltage_limit;
     if (answer.refusal.cause != DCMP_CAUSE_NONE) {
         now->refusal = answer.refusal;
     } else if (answer.over) {
         dcmp_phases_enter(now, DCMP_RUN_SETTLING, tick, notes);
     } else {
-        const real below = answer.voltage < most ? answer.voltage : most;
-        now->push = below > -most ? below : -most;
+        now->push = dcmp_limited(setup->voltage_limit, answer.voltage);
     }
 }
 
@@ -212,12 +205,7 @@ static inline real dcmp_partial_voltage(const struct dcmp_phases *now, const str
     if (!(most > REAL(0.0))) {
         return REAL(0.0);
     }
-    const real highest = now->last + setup->slew;
-    const real lowest = now->last - setup->slew;
-    const real below = demand < most ? demand : most;
-    const real within = below > -most ? below : -most;
-    const real slower = within < highest ? within : highest;
-    return slower > lowest ? slower : lowest;
+    return dcmp_slewed(setup->slew, dcmp_limited(most, demand), now->last);
 }
 
 /* What is sent, V: it was limited, and the limits may object. Without authority nothing is to be led to 0 V. */

@@ -65,14 +65,14 @@ class _Check:
         self.cause = 0.0
 
     def check(self, sample: Sample, estimate: Estimate) -> TripRequest | None:
-        assert (sample, estimate) != (None, None)
+        assert sample.position == estimate.position
         return _request(self.cause)
 
 
 def _rows(seed: int, rare: float) -> list[tuple[float, ...]]:
     """Return cycles with lost ticks, demands beyond every limit, and objections now and then."""
     chance = random.Random(seed)
-    rows, tick = [], 0
+    rows, tick = list[tuple[float, ...]](), 0
 
     def one_of(share: float, *causes: int) -> float:
         return float(chance.choice(causes)) if chance.random() < share * rare else 0.0

@@ -36,7 +36,7 @@ def _case(
     source = _Asked()
     python = Trajectory(source, soft_start)
     python.hold(HELD)
-    rows, wanted, before = [], [], 0
+    rows, wanted, before = list[list[float]](), list[float](), 0
     for tick in ticks:
         t = tick * period
         if tick >= begins and python.began == math.inf:
