@@ -16,6 +16,7 @@ TARGET = Target(
         "core/dcmp_elementary.h",
         "core/dcmp_random.h",
         "core/dcmp_plant.h",
+        "boards/simlib/simlib.h",
         "boards/simlib/simlib.c",
     ),
     (*SHARED, "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
