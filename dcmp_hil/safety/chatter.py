@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from functools import partial
+from functools import partial, reduce
 from itertools import pairwise
+from operator import add
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,7 +79,8 @@ class Chatter:
             return None
         self._rates.append(change / gone)
         rates, quiet = list(self._rates), 2.0 * _PAUSE_SHARE_MAX * self._limit
-        mean = sum(rates[-_WINDOW_BLOCKS:]) / _WINDOW_BLOCKS
+        # One after the other: from Python 3.12 on, sum() of floats rounds otherwise.
+        mean = reduce(add, rates[-_WINDOW_BLOCKS:], 0.0) / _WINDOW_BLOCKS
         goes_on = mean >= self._limit and sum(rates[-2:]) >= quiet
         self._bursts = self._bursts + _BURST_WEIGHT if goes_on else max(0, self._bursts - _PAUSE_WEIGHT)
         steady = goes_on and len(rates) > _WINDOW_BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))

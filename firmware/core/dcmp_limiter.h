@@ -136,7 +136,7 @@ struct dcmp_limiter {
     struct dcmp_lasting saturated;
     struct dcmp_lasting astray;
     struct dcmp_told told[DCMP_LIMIT_KINDS];
-    struct dcmp_limit_told of_reference; /* what the last call says; DCMP_LIMIT_NONE for nothing */
+    struct dcmp_limit_told of_reference; /* what is told in this cycle; DCMP_LIMIT_NONE for nothing */
     struct dcmp_limit_told of_voltage;
     struct dcmp_limit_told of_slew;
     struct dcmp_objection objection; /* why the run should end */
@@ -188,14 +188,16 @@ static inline struct dcmp_limit_told dcmp_limit_of(const struct dcmp_limiter_set
     return acts;
 }
 
-/* Judge a reference: `asked` for, and as `governed`, with whether the governor `leads`, so that it is not what was asked for;
- * the measured position in rad. */
+/* Judge the reference of a cycle, before its voltage: `asked` for, and as `governed`, with whether the governor `leads`, so that
+ * it is not what was asked for; the measured position in rad. */
 static inline void dcmp_limit_reference(struct dcmp_limiter *limiter, const struct dcmp_limiter_setup *setup,
                                         int64_t tick, real position, struct dcmp_reference asked,
                                         struct dcmp_reference governed, bool leads)
 {
     const struct dcmp_limit_told nothing = {DCMP_LIMIT_NONE, REAL(0.0), REAL(0.0)};
     limiter->of_reference = nothing;
+    limiter->of_voltage = nothing;
+    limiter->of_slew = nothing;
     if (!(dcmp_magnitude(governed.position - position) <= setup->error)) {
         limiter->astray = dcmp_holds(limiter->astray, tick, setup->gap, setup->period);
         if (dcmp_lasts(limiter->astray, DCMP_TRACKING_TIME_MAX, setup->period)) {
@@ -260,9 +262,6 @@ static inline void dcmp_limiter_block(struct dcmp_limiter *limiter, const struct
 static inline real dcmp_limit_voltage(struct dcmp_limiter *limiter, const struct dcmp_limiter_setup *setup,
                                       int64_t tick, real demand, real last)
 {
-    const struct dcmp_limit_told nothing = {DCMP_LIMIT_NONE, REAL(0.0), REAL(0.0)};
-    limiter->of_voltage = nothing;
-    limiter->of_slew = nothing;
     real voltage = demand;
     if (setup->slews || !(dcmp_magnitude(demand) <= setup->voltage)) {
         voltage = dcmp_limiter_bound(limiter, setup, tick, demand, last);

@@ -65,3 +65,28 @@ void CHECK(trajectory)(const double *setup, const double *rows, double *out, uin
  * limits. Of each row come out voltage, phase, whether the trajectory begins, over, orderly, cause and its tick, number of notes,
  * and the phase of the last note. */
 void CHECK(phases)(const double *setup, const double *rows, double *out, uint32_t n);
+
+/* dcmp_time.h: period first, in s; ticks, and rows of two of them. */
+void CHECK(instant)(double period, const double *ticks, double *out, uint32_t n);
+void CHECK(elapsed)(double period, const double *rows, double *out, uint32_t n);
+void CHECK(lasting)(const double *setup, const double *ticks, double *out, uint32_t n); /* period, gap, allowed */
+void CHECK(telling)(const double *setup, const double *ticks, double *out, uint32_t n); /* period, pause */
+
+/* dcmp_cause.h */
+void CHECK(leaves_time)(const double *causes, double *out, uint32_t n);
+
+/* dcmp_monitors.h */
+/* period, speed, floor, usual; tick, position; out come: off, count, and cause, tick and number of the objection. */
+void CHECK(outliers)(const double *setup, const double *rows, double *out, uint32_t n);
+void CHECK(all_finite)(const double *rows, double *out, uint32_t n); /* t, position, voltage, x1 x2 w */
+void CHECK(range)(const double *setup, const double *rows, double *out, uint32_t n); /* position, velocity */
+/* velocity, keep, limit, cycles; x1 x2 w; cause, filtered, above */
+void CHECK(watch)(const double *setup, const double *rows, double *out, uint32_t n);
+
+/* dcmp_limiter.h */
+void CHECK(limited)(double most, const double *x, double *out, uint32_t n);
+void CHECK(slewed)(double step, const double *rows, double *out, uint32_t n);        /* voltage, last */
+void CHECK(chatter)(const double *setup, const double *rows, double *out, uint32_t n); /* period, limit; tick, change */
+/* The setup in its order; tick, position, reference asked for and governed, whether it leads, demand, whether with authority
+ * (else the demand is what is sent); out come the voltage, three times what is told, clamped, and the objection. */
+void CHECK(limiter)(const double *setup, const double *rows, double *out, uint32_t n);
