@@ -70,7 +70,7 @@ static inline real dcmp_signed(real size, real x)
 static inline bool dcmp_finite_reference(struct dcmp_reference asked)
 {
     const real sum = asked.position + asked.velocity + asked.acceleration;
-    return sum - sum == REAL(0.0);
+    return dcmp_is_finite(sum);
 }
 
 static inline bool dcmp_inside(struct dcmp_reference asked, struct dcmp_bounds bounds)
@@ -94,7 +94,7 @@ static inline bool dcmp_allowed(struct dcmp_reference asked, struct dcmp_bounds 
 /* A jump of this size, rad, is no longer and no faster than one may be. */
 static inline bool dcmp_short_jump(real size, struct dcmp_bounds bounds)
 {
-    const bool known = bounds.strongest - bounds.strongest == REAL(0.0);
+    const bool known = dcmp_is_finite(bounds.strongest);
     const real fastest =
         known ? dcmp_square_root(DCMP_JUMP_GAIN_RATIO_MAX * bounds.strongest * size) : REAL(0.0);
     return size <= DCMP_JUMP_MAX && fastest <= bounds.velocity;

@@ -270,7 +270,7 @@ static inline struct dcmp_polarity_check dcmp_polarity_check(struct dcmp_polarit
     struct dcmp_polarity_check now = before;
     now.objection = none;
     const real sum = dcmp_instant(tick, period) + position + voltage;
-    if (!(sum - sum == REAL(0.0))) {
+    if (!dcmp_is_finite(sum)) {
         return dcmp_polarity_objects(now, tick, DCMP_CAUSE_PROBE_NUMBERS, position, voltage);
     }
     if (!now.began) {
