@@ -1,0 +1,2 @@
+#define DCMP_REAL_FLOAT
+#include "governor_checks.c"

@@ -1,0 +1,2 @@
+#define DCMP_REAL_FLOAT
+#include "polarity_check_checks.c"
