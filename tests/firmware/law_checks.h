@@ -90,6 +90,7 @@ void CHECK(chatter)(const double *setup, const double *rows, double *out, uint32
 /* The setup in its order; tick, position, reference asked for and governed, whether it leads, demand, whether with authority
  * (else the demand is what is sent); out come the voltage, three times what is told, clamped, and the objection. */
 void CHECK(limiter)(const double *setup, const double *rows, double *out, uint32_t n);
+
 /* dcmp_governor.h. The bounds; of each row come out the reference, whether it is the governor's own, and whether that leads. */
 void CHECK(governor)(const double *setup, double period, const double *rows, double *out, uint32_t n); /* tick, reference */
 /* A governor that leads moves on by some ticks: ticks, its last reference, the one asked for. */
