@@ -177,7 +177,7 @@ static inline void dcmp_phases_judge(struct dcmp_phases *now, const struct dcmp_
     if (objection.cause != DCMP_CAUSE_NONE) {
         dcmp_phases_stop(now, objection, tick, notes);
     }
-    if (!(demand - demand == REAL(0.0))) {
+    if (!dcmp_is_finite(demand)) {
         const struct dcmp_objection no_number = {tick, DCMP_CAUSE_DEMAND, demand, REAL(0.0)};
         dcmp_phases_stop(now, no_number, tick, notes);
     }

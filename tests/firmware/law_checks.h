@@ -102,3 +102,9 @@ void CHECK(polarity_check)(const double *setup, double period, const double *row
 void CHECK(motor_gain)(const double *setup, const double *rows, double *out, uint32_t n); /* time, way, voltage */
 /* Gain, deviation, farthest point, voltage reached; the cause comes out. */
 void CHECK(polarity_cause)(const double *setup, const double *rows, double *out, uint32_t n);
+
+/* dcmp_cycle.h: `parameters` is struct run_parameters of boards/simlib/run.h. Rows of tick, position, voltage, the reference's velocity
+ * in the middle and at the command's instant, and the reference. Of each row come out: left out, the estimate, the reference allowed,
+ * demand, voltage, begins, phase, over, orderly, cause, its tick and two numbers, remembers, number of notes, the code, first and
+ * second of 5 notes, motor gain and deviation. */
+void CHECK(cycle)(const double *parameters, const double *rows, double *out, uint32_t n);

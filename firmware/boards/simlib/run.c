@@ -4,12 +4,11 @@
 #include <stdbool.h>
 
 #include "dcmp_cycle.h"
+#include "run_setup.h"
 #include "simlib.h"
 
-#define GAP_PERIODS_MAX 2.5   /* between two cycles of one condition */
 #define SAME_INSTANT_SHARE 0.02 /* of the delay: instants that differ by less are one */
 #define NONE (__builtin_nan(""))
-#define INFINITE (__builtin_inf())
 
 /* What of a cycle comes next. */
 enum { NEXT_SAMPLE = 0, NEXT_SENSE = 1, NEXT_ACT = 2 };
@@ -44,67 +43,6 @@ struct job {
 
 /* ------------------------------------------------------------------------------------------------------------- set-up */
 
-static struct dcmp_r1_setup observer_of(const struct run_observer *from, double ku)
-{
-    struct dcmp_r1_setup to = {
-        .tuning = {ku, from->L1, from->w1, from->w2, from->M, from->mu0, from->floor_from}};
-    for (int gap = 0; gap < RUN_GAPS; gap++) {
-        const double *n = &from->steps[gap * RUN_STEP_NUMBERS];
-        const struct dcmp_step step = {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10]};
-        to.steps[gap] = step;
-    }
-    return to;
-}
-
-static struct dcmp_limiter_setup limiter_of(const struct run_parameters *p)
-{
-    const struct dcmp_limiter_setup limiter = {
-        .period = p->period,
-        .gap = GAP_PERIODS_MAX * p->period,
-        .voltage = p->amplifier_limit,
-        .step = p->slew,
-        .position = p->reference_x_max,
-        .velocity = p->reference_v_max,
-        .acceleration = p->reference_a_max,
-        .error = p->error_max,
-        .chatter = p->chatter_max,
-        .block = p->watched != 0 ? (int32_t)p->chatter_cycles : 0,
-        .slews = p->slew < INFINITE,
-    };
-    return limiter;
-}
-
-static struct dcmp_cycle_setup setup_of(const struct run_parameters *p)
-{
-    const struct run_friction *f = &p->friction;
-    const struct dcmp_cycle_setup setup = {
-        .period = p->period,
-        .delayed = p->delay_samples == 1.0,
-        .measured = p->measured != 0,
-        .feedforward = p->feedforward != 0,
-        .knows_friction = p->observer_kind == RUN_FRICTION_KALMAN,
-        .watched = p->watched != 0,
-        .governed = p->governed != 0,
-        .own = observer_of(&p->own, p->ku),
-        .friction = {f->friction_f0, f->friction_gravity, f->friction_ku, f->friction_f1, f->friction_f_max,
-                     f->friction_f1_variance, f->friction_q, f->friction_half_count, f->friction_restart_after,
-                     f->friction_unchanged_variance, f->friction_edge_variance, f->friction_d_noise},
-        .predictor = {p->a, p->p1, p->p2, p->ku},
-        .pd = {p->kp, p->kd, p->compensation, p->f0, p->volts},
-        .f1 = p->f1,
-        .outliers = {p->jump_speed, p->jump_floor, p->jump_usual},
-        .range = {p->position_max, p->velocity_max},
-        .second = observer_of(&p->watch, p->ku),
-        .watch = {p->velocity_max, p->disturbance_keep, p->disturbance_max, (int32_t)p->disturbance_cycles},
-        .bounds = {p->reference_x_max, p->reference_v_max, p->reference_a_max, p->reference_braking,
-                   p->reference_stop, p->reference_strongest},
-        .limiter = limiter_of(p),
-        .polarity = {p->probe_ku, p->probe_voltage, p->probe_gravity, p->count},
-        .phases = {p->period, p->settle, p->engage, p->amplifier_limit, p->slew, p->probes != 0},
-    };
-    return setup;
-}
-
 static struct simlib rig_of(const struct run_parameters *p)
 {
     const struct simlib sim = {
@@ -133,7 +71,7 @@ void run_begin(void *state, const struct run_parameters *parameters)
 {
     struct run *run = state;
     const struct run first = {
-        .setup = setup_of(parameters),
+        .setup = run_setup_of(parameters),
         .sim = rig_of(parameters),
         .delay = parameters->delay,
         .soft_start = parameters->soft_start,
