@@ -1,7 +1,7 @@
 /* The law: the default observer R1 (super-twisting), the predictor, the controller and the known part of friction.
  * State goes in and out by value; what depends on the length of a step alone is computed by the host and handed in as
  * numbers. dcmp_hil/control has the same operations in the same order, and says why they are these.
- * No branches where many lanes run, except in dcmp_step_periods. */
+ * No branches where many lanes run: only dcmp_super_twisting_update and dcmp_step_periods have some. */
 #ifndef DCMP_CONTROL_H
 #define DCMP_CONTROL_H
 
@@ -76,9 +76,9 @@ struct dcmp_gains {
 static inline struct dcmp_gains dcmp_matched_gains(real bandwidth_step)
 {
     const real x = bandwidth_step > DCMP_BANDWIDTH_STEP_MAX ? DCMP_BANDWIDTH_STEP_MAX : bandwidth_step;
-    const real e = dcmp_expm1(-DCMP_ROOT_A * x);
-    const real s = dcmp_sine(REAL(0.5) * DCMP_ROOT_C * x);
-    const real d = -dcmp_expm1(-DCMP_ROOT_R * x);
+    const real e = dcmp_expm1_within(-DCMP_ROOT_A * x);
+    const real s = dcmp_sine_within(REAL(0.5) * DCMP_ROOT_C * x);
+    const real d = -dcmp_expm1_within(-DCMP_ROOT_R * x);
     const real g = (REAL(1.0) + e) * (s * s);
     const real e0 = e * e + REAL(4.0) * g;
     const real e1 = REAL(2.0) * (REAL(2.0) * g - e);
@@ -138,7 +138,8 @@ static inline struct dcmp_super_twisting dcmp_super_twisting_correct(struct dcmp
     return next;
 }
 
-/* Advance by a step of dt, s, over the voltage really applied, V, and correct by the position y, rad. */
+/* Advance by a step of dt, s, over the voltage really applied, V, and correct by the position y, rad. On an encoder two of three
+ * innovations are above the floor: a run by itself is spared what the sliding gains cost. */
 static inline struct dcmp_super_twisting dcmp_super_twisting_update(struct dcmp_super_twisting now,
                                                                     struct dcmp_tuning tuning, struct dcmp_step step,
                                                                     real dt, real y, real voltage)
@@ -146,10 +147,10 @@ static inline struct dcmp_super_twisting dcmp_super_twisting_update(struct dcmp_
     const struct dcmp_super_twisting ahead = dcmp_super_twisting_advance(now, tuning.ku, step, dt, y, voltage);
     const real b = dcmp_innovation(ahead);
     const real size = dcmp_magnitude(b);
-    const struct dcmp_gains sliding = dcmp_sliding_gains(size, tuning, dt);
-    const struct dcmp_gains gains = {size >= tuning.floor_from ? step.k1 : sliding.k1,
-                                     size >= tuning.floor_from ? step.k2 : sliding.k2,
-                                     size >= tuning.floor_from ? step.k3 : sliding.k3};
+    struct dcmp_gains gains = {step.k1, step.k2, step.k3};
+    if (!(size >= tuning.floor_from)) {
+        gains = dcmp_sliding_gains(size, tuning, dt);
+    }
     return dcmp_super_twisting_correct(ahead, gains, b);
 }
 

@@ -41,22 +41,40 @@ static inline real dcmp_floor(real x)
     return dcmp_magnitude(x) < DCMP_WHOLE ? whole : x;
 }
 
-/* sin x, x in rad: 0 beyond DCMP_SINE_MAX, NaN for an argument that is not finite. */
-static inline real dcmp_sine(real x)
+/* (sin r - r) / (r z), z = r^2, for r from -pi/2 to pi/2. Single precision needs four coefficients: those whose largest error is
+ * least, 5e-9. */
+static inline real dcmp_sine_tail(real z)
 {
-    const real n = dcmp_nearest(x * REAL(0.3183098861837907));
-    const real r = ((x - n * DCMP_PI_1) - n * DCMP_PI_2) - n * DCMP_PI_3;
-    const real half = REAL(0.5) * n;
-    const real odd = half - dcmp_nearest(half); /* 0, or a half either way */
-    const real z = r * r;
+#ifdef DCMP_REAL_FLOAT
+    real tail = REAL(-0.00019806546333711594) + z * REAL(2.599902700239909e-06);
+    tail = REAL(0.008333016186952591) + z * tail;
+    return REAL(-0.16666656732559204) + z * tail;
+#else
     real tail = REAL(-7.643078395757952e-13) + z * REAL(2.722044477790634e-15);
     tail = REAL(1.6058943226030913e-10) + z * tail;
     tail = REAL(-2.505210694675562e-08) + z * tail;
     tail = REAL(2.755731921199205e-06) + z * tail;
     tail = REAL(-0.00019841269841214512) + z * tail;
     tail = REAL(0.00833333333333321) + z * tail;
-    tail = REAL(-0.16666666666666666) + z * tail;
-    const real sine = (REAL(1.0) - REAL(8.0) * odd * odd) * (r + r * (z * tail));
+    return REAL(-0.16666666666666666) + z * tail;
+#endif
+}
+
+/* sin x, for x that is within DCMP_SINE_MAX, rad, or NaN. */
+static inline real dcmp_sine_within(real x)
+{
+    const real n = dcmp_nearest(x * REAL(0.3183098861837907));
+    const real r = ((x - n * DCMP_PI_1) - n * DCMP_PI_2) - n * DCMP_PI_3;
+    const real half = REAL(0.5) * n;
+    const real odd = half - dcmp_nearest(half); /* 0, or a half either way */
+    const real z = r * r;
+    return (REAL(1.0) - REAL(8.0) * odd * odd) * (r + r * (z * dcmp_sine_tail(z)));
+}
+
+/* sin x, x in rad: 0 beyond DCMP_SINE_MAX, NaN for an argument that is not finite. */
+static inline real dcmp_sine(real x)
+{
+    const real sine = dcmp_sine_within(x);
     const real none = x - x;
     return dcmp_magnitude(x) < DCMP_SINE_MAX ? sine : none;
 }
@@ -67,19 +85,20 @@ static inline real dcmp_cosine(real x)
     return dcmp_sine(REAL(1.5707963267948966) - dcmp_magnitude(x));
 }
 
-/* e^x = scale (1 + p), for x limited to +-DCMP_EXPONENT_MAX. */
+/* e^x = scale (1 + p). */
 struct dcmp_exponential {
     real p;
     real scale;
 };
 
-static inline struct dcmp_exponential dcmp_exponential_of(real x)
+/* (e^r - 1 - r) / r^2, for r from -ln 2 / 2 to ln 2 / 2. Single precision needs half of the coefficients, as above: 1.4e-8. */
+static inline real dcmp_exponential_tail(real r)
 {
-    const real above = x > DCMP_EXPONENT_MAX ? DCMP_EXPONENT_MAX : x;
-    const real limited = x < -DCMP_EXPONENT_MAX ? -DCMP_EXPONENT_MAX : above;
-    const real sum = limited * REAL(1.4426950408889634) + DCMP_ROUNDING;
-    const real k = sum - DCMP_ROUNDING;
-    const real r = (limited - k * DCMP_LN2_1) - k * DCMP_LN2_2;
+#ifdef DCMP_REAL_FLOAT
+    real tail = REAL(0.008366066962480545) + r * REAL(0.001389823155477643);
+    tail = REAL(0.04166685417294502) + r * tail;
+    tail = REAL(0.1666654795408249) + r * tail;
+#else
     real tail = REAL(2.5109041879068726e-08) + r * REAL(2.0924467674204327e-09);
     tail = REAL(2.7557242700265607e-07) + r * tail;
     tail = REAL(2.7557244200044336e-06) + r * tail;
@@ -89,25 +108,47 @@ static inline struct dcmp_exponential dcmp_exponential_of(real x)
     tail = REAL(0.008333333333321633) + r * tail;
     tail = REAL(0.0416666666666667) + r * tail;
     tail = REAL(0.16666666666666677) + r * tail;
-    tail = REAL(0.5) + r * tail;
+#endif
+    return REAL(0.5) + r * tail;
+}
+
+/* The parts of e^x, for x that is within +-DCMP_EXPONENT_MAX, or NaN. */
+static inline struct dcmp_exponential dcmp_exponential_within(real x)
+{
+    const real sum = x * REAL(1.4426950408889634) + DCMP_ROUNDING;
+    const real k = sum - DCMP_ROUNDING;
+    const real r = (x - k * DCMP_LN2_1) - k * DCMP_LN2_2;
     /* The last bits of the sum are those of k. */
     const union dcmp_bits whole = {.number = sum};
     const union dcmp_bits scale = {.word = (whole.word + DCMP_EXPONENT_BIAS) << DCMP_MANTISSA_BITS};
-    const struct dcmp_exponential parts = {r + r * r * tail, scale.number};
+    const struct dcmp_exponential parts = {r + r * r * dcmp_exponential_tail(r), scale.number};
     return parts;
+}
+
+/* x limited to +-DCMP_EXPONENT_MAX; NaN of NaN. */
+static inline real dcmp_exponent(real x)
+{
+    const real above = x > DCMP_EXPONENT_MAX ? DCMP_EXPONENT_MAX : x;
+    return x < -DCMP_EXPONENT_MAX ? -DCMP_EXPONENT_MAX : above;
+}
+
+/* e^x - 1, for x that is within +-DCMP_EXPONENT_MAX, or NaN. */
+static inline real dcmp_expm1_within(real x)
+{
+    const struct dcmp_exponential parts = dcmp_exponential_within(x);
+    return parts.scale * parts.p + (parts.scale - REAL(1.0));
 }
 
 /* e^x - 1; NaN of NaN. */
 static inline real dcmp_expm1(real x)
 {
-    const struct dcmp_exponential parts = dcmp_exponential_of(x);
-    return parts.scale * parts.p + (parts.scale - REAL(1.0));
+    return dcmp_expm1_within(dcmp_exponent(x));
 }
 
 /* e^x; NaN of NaN. */
 static inline real dcmp_exp(real x)
 {
-    const struct dcmp_exponential parts = dcmp_exponential_of(x);
+    const struct dcmp_exponential parts = dcmp_exponential_within(dcmp_exponent(x));
     return parts.scale * parts.p + parts.scale;
 }
 
@@ -154,7 +195,11 @@ static inline real dcmp_inverse_cube_root(real x)
     real h = REAL(1.0) - m * (y * y * y);
     y = y + y * (h * (REAL(1.0 / 3.0) + h * (REAL(2.0 / 9.0) + h * REAL(14.0 / 81.0))));
     h = REAL(1.0) - m * (y * y * y);
+#ifdef DCMP_REAL_FLOAT
+    y = y + y * (h * REAL(1.0 / 3.0));
+#else
     y = y + y * (h * (REAL(1.0 / 3.0) + h * REAL(2.0 / 9.0)));
+#endif
     const real root = y * scale.number;
     return x > REAL(0.0) ? root : x;
 }

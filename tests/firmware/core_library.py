@@ -75,10 +75,10 @@ def law_headers() -> dict[Path, Path]:
 
 
 def law_checks(header: Path) -> list[Path]:
-    """Return the files of the tests that use all of a header; one type is enough for code."""
-    if header.stem == "dcmp_real":
-        return [HERE / "elementary_checks.c", HERE / "elementary_float_checks.c"]
-    return [law_headers()[header]]
+    """Return the files of the tests that use all of a header; one type is enough where it has one text."""
+    stem = "elementary" if header.stem == "dcmp_real" else header.stem.removeprefix("dcmp_")
+    of_both = "DCMP_REAL_FLOAT" in header.read_text("utf-8")
+    return [HERE / f"{stem}{kind}_checks.c" for kind in (("", "_float") if of_both else ("",))]
 
 
 def compile_all(folder: Path, flags: list[str], *more: Path) -> list[Path]:
