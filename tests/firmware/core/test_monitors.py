@@ -73,16 +73,18 @@ def _filtered(limits: Array, rows: Array) -> Array:
         (math.inf, 0.0, math.inf),
     ],
 )
+@pytest.mark.parametrize("kind", ["", "float_"])
 def test_outliers_have_the_bits_of_python(
-    core: Core, monkeypatch: pytest.MonkeyPatch, speed: float, floor: float, usual: float
+    core: Core, monkeypatch: pytest.MonkeyPatch, kind: str, speed: float, floor: float, usual: float
 ) -> None:
+    """In single precision as well: quarters and powers of 2 are exact in both."""
     monkeypatch.setattr(outlier_filter, "jumped", lambda t, moved: (t, moved))
     limits = np.array([TIE_S, speed, floor, usual])
     ends = set()
     for seed in range(40):
         rows = _jumpy(seed, 200)
         wanted = _filtered(limits, rows)
-        assert same_bits(Law(core)("outliers", limits, rows, width=5), wanted)
+        assert same_bits(Law(core, kind)("outliers", limits, rows, width=5), wanted)
         ends.add(wanted[-1, 2])
     assert (JUMP in ends) != math.isinf(speed)
 
