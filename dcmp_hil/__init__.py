@@ -14,7 +14,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dcmp_hil.api import run
+    from dcmp_hil.api import run, simulate
     from dcmp_hil.backend import Backend
     from dcmp_hil.config import Rig, load_rig
     from dcmp_hil.control.controllers import Controller, ControllerContext
@@ -58,6 +58,7 @@ _HOMES = {
     "Truth": "dcmp_hil.values",
     "load_rig": "dcmp_hil.config",
     "run": "dcmp_hil.api",
+    "simulate": "dcmp_hil.api",
     "sweep": "dcmp_hil.sweeping.api",
 }
 
@@ -89,6 +90,7 @@ __all__ = [
     "__version__",
     "load_rig",
     "run",
+    "simulate",
     "sweep",
 ]
 

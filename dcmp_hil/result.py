@@ -61,6 +61,10 @@ class Result:
         Kinds of observers that were asked for beside the loop.
     last_columns
         With those, where columns were not kept: the columns of the last cycles, as many as the ring holds.
+    engine
+        What ran the cycles: "core", or "plain", the loop of the host. Both give the same bits.
+    engine_reason
+        Why it was not the core, in virtual time, in a sentence; empty otherwise.
     """
 
     rig: Rig
@@ -81,3 +85,5 @@ class Result:
     motor_gain: MotorGain | None = None
     compared: tuple[str, ...] = ()
     last_columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    engine: str = "plain"
+    engine_reason: str = ""

@@ -8,11 +8,9 @@ from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
-from dcmp_hil import loop
 from dcmp_hil.assembly import assemble, make_laws
 from dcmp_hil.config.compared_observers import observer_kinds
 from dcmp_hil.config.run_times import check_times
-from dcmp_hil.control.trajectory import LOWERING_TIME_S
 from dcmp_hil.errors import DeadlineError, TripError
 from dcmp_hil.fault_hooks import inject
 from dcmp_hil.ipc.run_end import NOT_OURS, ZERO, end_after
@@ -22,9 +20,9 @@ from dcmp_hil.platform.host_info import host_facts, in_words, require_linux
 from dcmp_hil.platform.realtime import RealTime
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.result import Result
-from dcmp_hil.telemetry.further_columns import begin
+from dcmp_hil.run_engine import fastest_drive, loop_drive, run_to_end
 from dcmp_hil.telemetry.memory_sink import MemorySink
-from dcmp_hil.telemetry.sink_factories import Deferred, deferred, sorted_out
+from dcmp_hil.telemetry.sink_factories import begin_all, deferred, sorted_out
 from dcmp_hil.telemetry.statistics import Statistics
 from dcmp_hil.telemetry.summary_sink import SummarySink
 from dcmp_hil.telemetry.telemetry_process import TelemetryProcess
@@ -78,6 +76,8 @@ class Session:
         what the board found wrong with itself. Set it when a person has looked, never by default.
     compare
         Kinds of observers that run beside the loop, on the same samples; a text may be a list of them.
+    plain
+        Whether the loop of the host runs in virtual time also where the core could.
 
     Raises
     ------
@@ -100,6 +100,7 @@ class Session:
         faults: Iterable[object] | Faults = (),
         clear: bool = False,
         compare: Sequence[str] = (),
+        plain: bool = False,
     ) -> None:
         length = rig.run.duration_s if duration is None else duration
         check_times(length, window_from, fast=fast)
@@ -146,6 +147,11 @@ class Session:
             laws=laws,
         )
         self._sinks = here
+        self._drive = (
+            fastest_drive(rig, self._stages, self._recorder, looked_at=bool(sinks))
+            if fast and not plain
+            else loop_drive(self._stages)
+        )
         self._realtime_factor = math.nan
 
     def run(self) -> None:
@@ -184,7 +190,7 @@ class Session:
             self._tell("ERROR", EventKind.TRIP, f"tripped ({trip.reason}): {trip}", CauseData(trip.reason))
             raise trip from seen.__cause__
         except DeadlineError as error:
-            if recorder.recent:  # refused before it began, it is no event of the run
+            if recorder.began:  # refused before it began, it is no event of the run
                 self._tell("ERROR", EventKind.DEADLINE, f"deadline: {error}", CauseData("deadline"))
             end, why = end_after(error, reached=reached, armed=armed), f"{error} "
             raise
@@ -221,11 +227,7 @@ class Session:
     def _open_telemetry(self) -> AbstractContextManager[None]:
         """Make the sinks, here and in a process of their own, before anything is armed or real-time."""
         further = self._recorder.further
-        for sink in self._sinks:
-            if isinstance(sink, Deferred):
-                sink.make(further)
-            else:
-                begin(sink, further)
+        begin_all(self._sinks, further)
         if self._control:
             ring = self._apart.ring_file if self._apart else None
             self._control.open(self.rig, ring, self._warn_live, further)
@@ -248,11 +250,7 @@ class Session:
             recorder.event(Event(0.0, "INFO", EventKind.DEVICE, f"device: {device}"))
         for remark in getattr(stages.backend, "remarks", ()):
             recorder.event(Event(0.0, "WARN", EventKind.DEVICE, remark))
-        t = loop.run(stages, self._length - 1.5 * self.rig.period, self.stop)
-        if self.rig.run.end == "lower" and not self.stop.requested:
-            recorder.event(Event(t, "INFO", EventKind.LOWERING, "lowering the arm"))
-            stages.trajectory.lower(t + stages.delay)
-            loop.run(stages, t + stages.delay + LOWERING_TIME_S, self.stop)
+        run_to_end(self._drive.cycles, self.rig, self._length, recorder, self.stop)
 
     def _tell(self, level: Level, kind: EventKind, text: str, data: EventData | None = None) -> None:
         """Report an event at the device time of the last cycle."""
@@ -268,7 +266,7 @@ class Session:
     @property
     def began(self) -> bool:
         """Whether there was a first period."""
-        return bool(self._recorder.recent)
+        return self._recorder.began
 
     @property
     def telemetry_pid(self) -> int | None:
@@ -291,10 +289,12 @@ class Session:
             grants=tuple(self._realtime.grants) if self._realtime else (),
             host=self._host,
             overruns=self._stages.deadline_monitor.count,
-            outliers=self._stages.outlier_filter.count,
+            outliers=self._drive.cycles.outliers,
             troubles=tuple(self._figures.troubles),
             changes=tuple(getattr(self._stages.changes, "made", ())),
-            motor_gain=self._stages.supervisor.motor_gain,
+            motor_gain=self._drive.cycles.motor_gain,
             compared=self._compared,
             last_columns=self._recorder.last_columns() if self._compared and not columns else {},
+            engine=self._drive.engine,
+            engine_reason=self._drive.reason,
         )

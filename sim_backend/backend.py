@@ -8,7 +8,7 @@ from dcmp_hil.common.fast_tuple import make
 from dcmp_hil.errors import LinkError
 from dcmp_hil.values import Fault, Sample
 from sim_backend.engine import engine_of
-from sim_backend.hardware import make_hardware
+from sim_backend.hardware import make_hardware, why_not_core
 from sim_backend.pacer import Pacer
 from sim_backend.plant_fault_hooks import HEALTHY
 
@@ -37,6 +37,13 @@ class SimBackend:
         What to sleep on.
     faults
         What goes wrong with plant and encoder.
+
+    Attributes
+    ----------
+    remarks
+        What a user should know of it.
+    why_not_core
+        Why the core does not have this rig as a whole, in a sentence; empty if it does.
     """
 
     simulated = True
@@ -48,6 +55,7 @@ class SimBackend:
         engine = engine_of(rig)
         self.remarks = engine.remarks
         self._hardware = make_hardware(rig, engine, faults)
+        self.why_not_core = why_not_core(rig, engine, faults)
         self._live = False
 
     def __enter__(self) -> Self:

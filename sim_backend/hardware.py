@@ -186,7 +186,7 @@ def _simulation(rig: Rig) -> Simulation:
         steps=rig.plant_steps,
         position=sim.position_rad,
         disturbance=math.nan,
-        seed=_as_signed(sim.seed),
+        seed=as_signed(sim.seed),
         lost=sim.lost_samples,
         count=rig.encoder.count,
         phase=sim.encoder_phase_counts,
@@ -199,13 +199,28 @@ def _simulation(rig: Rig) -> Simulation:
     )
 
 
-def _as_signed(seed: int) -> int:
+def as_signed(seed: int) -> int:
     """Return the lowest 64 bits of a seed as a signed integer."""
     return (seed + 2**63) % 2**64 - 2**63
 
 
 def make_hardware(rig: Rig, engine: Engine, faults: PlantFaults = HEALTHY) -> Hardware:
     """Make the hardware of a rig: as one where it is healthy, and its encoder's edges in their places."""
-    if engine.core and faults is HEALTHY and not rig.sim.encoder_edge_counts:
-        return CoreHardware(rig)
-    return StagedHardware(rig, engine, faults)
+    if why_not_core(rig, engine, faults):
+        return StagedHardware(rig, engine, faults)
+    return CoreHardware(rig)
+
+
+def why_not_core(rig: Rig, engine: Engine, faults: PlantFaults = HEALTHY) -> str:
+    """Return why the core does not have the hardware of a rig, in a sentence; empty if it does."""
+    sim = rig.sim
+    if engine.remark:
+        return engine.remark
+    if not engine.core:
+        return (
+            f'the core has neither this plant nor details of it: sim.engine is "{sim.engine}", '
+            f'sim.integrator "{sim.integrator}".'
+        )
+    if faults is not HEALTHY:
+        return "the core has no faults of plant and encoder."
+    return "the core has encoders with even edges alone." if sim.encoder_edge_counts else ""

@@ -49,6 +49,8 @@ class Chatter:
 
     Attributes
     ----------
+    expected
+        As given.
     block
         Periods of a block.
     samples
@@ -62,12 +64,12 @@ class Chatter:
         self._rates: deque[float] = deque(maxlen=_WINDOW_BLOCKS + 1)  # V/s, of the newest blocks
         self._bursts = 0
         self._t = math.nan
-        self._expected = self._limit = math.nan
+        self.expected = self._limit = math.nan
         self.expect(expected)
 
     def expect(self, variation: float) -> None:
         """Set the expected variation after a change of gains, V/s."""
-        self._expected, self._limit = variation, limit_V_s(variation)
+        self.expected, self._limit = variation, limit_V_s(variation)
 
     def judge(self, t: float, change: float) -> TripRequest | None:
         """Judge the sum of |dV| (V) of a block that ends at `t` (s, device time); return a request to trip.
@@ -86,7 +88,7 @@ class Chatter:
         steady = goes_on and len(rates) > _WINDOW_BLOCKS and all(a + b >= quiet for a, b in pairwise(rates))
         if not steady and self._bursts < _BURST_SCORE_MAX:
             return None
-        return chattering(t, mean, self._expected, self._cause)
+        return chattering(t, mean, self.expected, self._cause)
 
     def _cause(self) -> tuple[str, str]:
         return cause_of(self.samples, self._count)

@@ -81,6 +81,8 @@ class Limiter:
         Of the reference.
     clamped
         Periods in which the demand was more than the limits allowed.
+    chatter
+        Judges the variation of the voltage; None where nothing does.
     objection
         Why the run should end: a limit that has acted for too long, or chatter; None while it may go on.
     """
@@ -111,13 +113,13 @@ class Limiter:
         self._saturated = _Lasting(_SATURATION_TIME_MAX_S, CONSECUTIVE_GAP_PERIODS_MAX * period)
         self._astray = _Lasting(_TRACKING_ERROR_TIME_MAX_S, CONSECUTIVE_GAP_PERIODS_MAX * period)
         self.clamped = 0
-        self._chatter: Chatter | None = None
+        self.chatter: Chatter | None = None
         self._change = 0.0  # V, sum of |dV| in this block
         self._left = -1  # periods to its end, if it has one
 
     def watch_variation(self, chatter: Chatter) -> None:
         """Begin to judge the variation of the voltage."""
-        self._chatter, self._left = chatter, chatter.block
+        self.chatter, self._left = chatter, chatter.block
 
     def limit_reference(self, sample: Sample, reference: Reference) -> Reference:
         """Return the reference, or what of it is allowed; NaN stays, and trips as the demand."""
@@ -143,9 +145,9 @@ class Limiter:
         return max(last - self._step, min(last + self._step, voltage))
 
     def _judge_variation(self, t: float) -> None:
-        assert self._chatter is not None  # noqa: S101 - without one, no block ends
-        self.objection = self.objection or self._chatter.judge(t, self._change)
-        self._change, self._left = 0.0, self._chatter.block
+        assert self.chatter is not None  # noqa: S101 - without one, no block ends
+        self.objection = self.objection or self.chatter.judge(t, self._change)
+        self._change, self._left = 0.0, self.chatter.block
 
     def _judged(self, sample: Sample, asked: Reference, reference: Reference) -> Reference:
         """Report a limited reference; stop if the arm is too far from the governed one."""

@@ -122,6 +122,11 @@ class PolarityCheck:
         self.voltage = 0.0
 
     @property
+    def push(self) -> float:
+        """Voltage of a push, V."""
+        return self._push
+
+    @property
     def telling(self) -> bool:
         """Whether the encoder is fine enough for the probe to say anything."""
         return (

@@ -93,7 +93,7 @@ class Supervisor:
 
     Attributes
     ----------
-    limiter
+    limiter, settle, engage, probe
         As given.
     limit_reference
         What of a reference the limiter allows.
@@ -119,9 +119,9 @@ class Supervisor:
         self.limiter = limiter
         self._limited = limiter.limit_voltage
         self.limit_reference = limiter.limit_reference
-        self._settle, self._engage = settle, engage
+        self.settle, self.engage = settle, engage
         self._notify = notify
-        self._probe = probe
+        self.probe = probe
         self._since = math.nan  # s, device time at which the present phase began
         self._push = 0.0  # V, what the probe wants
         self._refusal: TripRequest | None = None  # of the probe
@@ -136,17 +136,17 @@ class Supervisor:
     @property
     def motor_gain(self) -> MotorGain | None:
         """Result of the polarity check; None without one, and before its end."""
-        return self._probe.found if self._probe else None
+        return self.probe.found if self.probe else None
 
     def engages(self, sample: Sample) -> bool:
         """Move on to the phase of this period; True in the first of ENGAGING, when the trajectory starts."""
         if self._has_authority:
             return False
         if self.phase is Phase.ARMING:
-            self._advance(PhaseEvent.ARMED if self._probe else PhaseEvent.ARMED_UNPROBED, sample.t)
+            self._advance(PhaseEvent.ARMED if self.probe else PhaseEvent.ARMED_UNPROBED, sample.t)
         if self.phase is Phase.PROBING:
             self._go_on_probing(sample)
-        if self.phase is Phase.SETTLING and sample.t - self._since >= self._settle:
+        if self.phase is Phase.SETTLING and sample.t - self._since >= self.settle:
             self._advance(PhaseEvent.SETTLED, sample.t)
             return True
         return False
@@ -186,24 +186,24 @@ class Supervisor:
         self._advance(PhaseEvent.FAULT if cause.urgency is Urgency.NOW else PhaseEvent.CONCERN, t)
 
     def _go_on_probing(self, sample: Sample) -> None:
-        assert self._probe is not None  # noqa: S101 - the table leads here only with one
-        refusal = self._probe.check(sample)
+        assert self.probe is not None  # noqa: S101 - the table leads here only with one
+        refusal = self.probe.check(sample)
         if refusal is not None:
             self._refusal = (
                 refusal  # behind what the checks find in this cycle: a jump is no motion of the arm
             )
-        elif self._probe.over:
+        elif self.probe.over:
             self._advance(PhaseEvent.PROBED, sample.t)
         else:
             most = self.limiter.voltage_limit
-            self._push = max(-most, min(most, self._probe.voltage))
+            self._push = max(-most, min(most, self.probe.voltage))
 
     def _leave_phase(self, t: float) -> None:
         """Leave PROBING where the probe has refused, ENGAGING with full authority, STOPPING with none."""
         if self._refusal is not None:
             self.stop(self._refusal, t)
         gone = t - self._since
-        if self.phase is Phase.ENGAGING and not gone < self._engage:
+        if self.phase is Phase.ENGAGING and not gone < self.engage:
             self._advance(PhaseEvent.ENGAGED, t)
         elif self.phase is Phase.STOPPING and not gone < _RAMP_TIME_S:
             self._advance(PhaseEvent.STOPPED, t)
@@ -214,7 +214,7 @@ class Supervisor:
             return self._push
         gone, most = t - self._since, 0.0
         if self.phase is Phase.ENGAGING and gone > 0.0:  # at 0 an infinite limit would give NaN
-            most = self.limiter.voltage_limit * gone / self._engage
+            most = self.limiter.voltage_limit * gone / self.engage
         elif self.phase is Phase.STOPPING:
             most = self._stop_from * (1.0 - gone / _RAMP_TIME_S)
         if not most > 0.0:

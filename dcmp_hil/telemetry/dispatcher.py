@@ -13,8 +13,10 @@ from dcmp_hil.values import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from dcmp_hil.control.model import Model
-    from dcmp_hil.ipc.ring import Ring
 
 BLOCK_PERIOD_S = 0.1  # s between two blocks in real time
 _EVENTS_MAX = 10_000  # events
@@ -37,6 +39,28 @@ class Sink(Protocol):
         ...
 
 
+class RowSource(Protocol):
+    """Protocol of what rows are drained from: a ring, or batches of rows."""
+
+    further: tuple[str, ...]
+    dropped: int
+    position: int
+    """Number of the next row to read."""
+
+    @property
+    def newest(self) -> float:
+        """Device time of the newest row, s; 0 before the first."""
+        ...
+
+    def __len__(self) -> int:
+        """Return the number of rows not read yet."""
+        ...
+
+    def drain(self) -> NDArray[np.float64]:
+        """Return every row not read yet, oldest first, shape (n, fields)."""
+        ...
+
+
 class SinkDispatcher:
     """Dispatches the rows of a ring and the waiting events to the sinks, when `dispatch` is called.
 
@@ -54,7 +78,7 @@ class SinkDispatcher:
 
     def __init__(
         self,
-        ring: Ring,
+        ring: RowSource,
         sinks: Sequence[Sink],
         tell: Callable[[Event], None] | None = None,
         model: Model = UNKNOWN_MODEL,

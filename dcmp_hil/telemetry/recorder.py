@@ -11,6 +11,7 @@ from dcmp_hil.telemetry.block import Block
 from dcmp_hil.telemetry.dispatcher import DispatchThread, Sink, SinkDispatcher
 from dcmp_hil.telemetry.further_columns import NO_FURTHER_COLUMNS
 from dcmp_hil.telemetry.link_events import LinkWatch
+from dcmp_hil.telemetry.row_batches import RowBatches
 from dcmp_hil.telemetry.signals import columns
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class Recorder:
     Attributes
     ----------
     recent
-        The last cycles.
+        The last cycles that came one by one.
     recent_further
         Their further columns.
     further
@@ -82,6 +83,7 @@ class Recorder:
         backend: object = None,
         further: FurtherColumns = NO_FURTHER_COLUMNS,
     ) -> None:
+        self._recent_max = recent
         self.recent: deque[Cycle] = deque(maxlen=recent)
         self.recent_further: deque[tuple[float, ...]] = deque(maxlen=recent)
         self.further = further.names
@@ -102,6 +104,7 @@ class Recorder:
         self._in_line = in_line
         self._service = DispatchThread(self._audience) if sinks and not in_line else None
         self._closed = False
+        self._batches: RowBatches | None = None
 
     def record(self, cycle: Cycle) -> None:
         """Write the values of one cycle into the ring; never block."""
@@ -117,11 +120,39 @@ class Recorder:
         self.recent.append(cycle)
         self._left -= 1
         if not self._left:
-            self._left = self._every
-            self._look_at_link(t)
-            self._tell_further()
-            if self._in_line:
-                self._audience.dispatch()
+            self._do_now_and_then(t)
+
+    def take_batches(self, *, large: bool = False) -> None:
+        """Prepare for `extend` in place of `record`, in virtual time.
+
+        Parameters
+        ----------
+        large
+            Whether blocks may be larger than those of `record`: nothing looks at how the run is cut.
+        """
+        self._batches = self._audience.ring = RowBatches(self._recent_max, self.further)
+        if large:
+            self._every = self._left = _SYNCHRONOUS_BLOCK_ROWS_MAX
+
+    @property
+    def room(self) -> int:
+        """Number of rows that `extend` takes at most: up to the end of the present block."""
+        return self._left
+
+    def extend(self, rows: NDArray[np.float64]) -> None:
+        """Take the rows of cycles, shape (n, fields), 0 < n <= room; they must stay as they are."""
+        assert self._batches is not None  # noqa: S101 - see take_batches
+        self._batches.add(rows)
+        self._left -= len(rows)
+        if not self._left:
+            self._do_now_and_then(self._batches.newest)
+
+    def _do_now_and_then(self, t: float) -> None:
+        self._left = self._every
+        self._look_at_link(t)
+        self._tell_further()
+        if self._in_line:
+            self._audience.dispatch()
 
     def event(self, event: Event) -> None:
         """Process an event."""
@@ -131,8 +162,11 @@ class Recorder:
 
     def fill(self, trip: TripError) -> None:
         """Give a trip the last second of cycles."""
-        trip.cycles = tuple(self.recent)
-        trip.further, trip.further_values = self.further, tuple(self.recent_further)
+        cycles, further = (
+            self._batches.recent() if self._batches is not None else (self.recent, self.recent_further)
+        )
+        trip.cycles = tuple(cycles)
+        trip.further, trip.further_values = self.further, tuple(further) if self.further else ()
 
     def tell_rest(self) -> None:
         """Report what link and further columns have not told yet: the run has ended."""
@@ -150,12 +184,19 @@ class Recorder:
     @property
     def t(self) -> float:
         """Device time of the last cycle, s; 0 before the first."""
+        if self._batches is not None:
+            return self._batches.newest
         return self.recent[-1].sample.t if self.recent else 0.0
+
+    @property
+    def began(self) -> bool:
+        """Whether there was a first cycle."""
+        return self.written > 0
 
     @property
     def written(self) -> int:
         """Number of periods recorded so far."""
-        return self._ring.written
+        return self._batches.written if self._batches is not None else self._ring.written
 
     @property
     def dropped(self) -> int:

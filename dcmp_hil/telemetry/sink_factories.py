@@ -79,6 +79,21 @@ def deferred(sinks: Sequence[Sink | SinkMaker]) -> list[Sink]:
     return [one if isinstance(one, Sink) else Deferred(one) for one in sinks]
 
 
+def begin_all(sinks: Sequence[Sink], further: tuple[str, ...]) -> None:
+    """Make the sinks that are deferred, and tell all of them the names of the further columns.
+
+    Raises
+    ------
+    ConfigError
+        If the function that makes one does.
+    """
+    for sink in sinks:
+        if isinstance(sink, Deferred):
+            sink.make(further)
+        else:
+            begin(sink, further)
+
+
 def sorted_out(sinks: Sequence[Sink | SinkMaker]) -> tuple[list[Sink], list[bytes]]:
     """Return the sinks that run in this process, and pickled what makes one in another."""
     pickled = [b"" if isinstance(one, Sink) else _pickled(one) for one in sinks]

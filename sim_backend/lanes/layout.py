@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import functools
-import math
-import re
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from sim_backend.compiling import build
+from sim_backend.compiling import build, header
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+
 HEADER = "boards/simlib/lanes.h"
-_STRUCT = re.compile(r"struct (\w+) \{\n(.*?)\n\};", re.DOTALL)
-_FIELD = re.compile(r"^    (?:struct )?(\w+) (\w+)(?:\[([\w *]+)\])?;", re.MULTILINE)
-_CONSTANT = re.compile(r"^ *#?(?:define)? *(LANES_\w+)(?: =)? (\d+)", re.MULTILINE)
-_NUMBERS: Mapping[str, type] = {"double": np.float64, "int64_t": np.int64}
 
 
 class LanesLayout(NamedTuple):
@@ -58,14 +52,4 @@ def layout(lanes: int) -> LanesLayout:
 
 def read(text: str, lanes: int) -> LanesLayout:
     """Read the layout from the text of the header."""
-    constants = {name: int(number) for name, number in _CONSTANT.findall(text)} | {"DCMP_LANES": lanes}
-    structures: dict[str, np.dtype[np.void]] = {}
-    for name, body in _STRUCT.findall(text):
-        fields = []
-        for kind, field, length in _FIELD.findall(body):
-            number = _NUMBERS.get(kind)
-            of: np.dtype[np.generic] = structures[kind] if number is None else np.dtype(number)
-            shape = () if not length else (math.prod(constants[one] for one in length.split(" * ")),)
-            fields.append((field, of, shape))
-        structures[name] = np.dtype(fields)
-    return LanesLayout(lanes, structures, constants)
+    return LanesLayout(lanes, *header.read(text, {"DCMP_LANES": lanes}))

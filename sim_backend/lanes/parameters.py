@@ -69,7 +69,7 @@ def lane_numbers(rig: Rig, *, exact_chatter: bool) -> LaneNumbers:
     watch = _tuned(context, usual.L1_1_s, usual.L2_1_s2, None, floor, longest)
     gaps = tuple((one.nominal, *one.gaps.values()) for one in (own, watch)) if rig.sim.lost_samples else ()
     return LaneNumbers(
-        _of_plant(rig) | _of_law(rig) | _of_supervisor(rig, exact_chatter=exact_chatter),
+        of_plant(rig) | of_law(rig) | of_supervisor(rig, exact_chatter=exact_chatter),
         _of_observer(own, context.model.f0),
         _of_observer(watch, context.model.f0),
         gaps,
@@ -97,7 +97,8 @@ def _of_observer(tuning: Tuning, f0: float) -> dict[str, float]:
     }
 
 
-def _of_plant(rig: Rig) -> dict[str, float]:
+def of_plant(rig: Rig) -> dict[str, float]:
+    """Return the numbers of the simulated rig."""
     plant, sim = rig.plant, rig.sim
     return {
         "plant_f0": plant.f0,
@@ -121,7 +122,8 @@ def _of_plant(rig: Rig) -> dict[str, float]:
     }
 
 
-def _of_law(rig: Rig) -> dict[str, float]:
+def of_law(rig: Rig) -> dict[str, float]:
+    """Return the numbers of model, predictor and controller."""
     model = rig.model.values()
     a, p1, p2 = held_input(model.f0, rig.period)
     assert isinstance(rig.controller, PdSettings)  # noqa: S101 - others are refused
@@ -140,7 +142,8 @@ def _of_law(rig: Rig) -> dict[str, float]:
     }
 
 
-def _of_supervisor(rig: Rig, *, exact_chatter: bool) -> dict[str, float]:
+def of_supervisor(rig: Rig, *, exact_chatter: bool) -> dict[str, float]:
+    """Return the numbers of the supervisor; `exact_chatter` as for `lane_numbers`."""
     limits, period, count = rig.supervisor, rig.period, rig.encoder.count
     watched = limits.monitors == "all"
     bounds = make_limiter(rig, lambda _: None).bounds

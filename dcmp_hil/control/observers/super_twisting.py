@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
@@ -236,17 +237,15 @@ class SuperTwisting:
         self._z1, self._z2 = x1 - self._v1, x2 - self._v2 - self._L1 * self._v1
 
     def _use(self, tuning: Tuning) -> None:
-        self._L1, L2, self.M, self.mu0, self._nominal, self._gaps = tuning
-        self._L2 = L2
-        self._w1, self._w2 = L2 + self._f0 * self._L1, self._L1 + self._f0
+        self._L1, self._L2, self.M, self.mu0, self._nominal, self._gaps = tuning
+        self._w1, self._w2 = self._L2 + self._f0 * self._L1, self._L1 + self._f0
         # An innovation at least this large is slower than the floor.
         cube = self.mu0 * self.mu0 * self.mu0  # 0 of a floor so small that it is none
         self._floor_from = self.M / cube if cube > 0.0 else math.inf
 
     def _restart(self, t: float, y: float) -> Estimate:
         """Begin at rest where the arm is: never at 0, which would be a step of the whole position."""
-        self._t, self._y = t, y
-        self._z1, self._z2 = y, 0.0
+        self._t, self._y, self._z1, self._z2 = t, y, y, 0.0
         self._v1 = self._v2 = self._v3 = 0.0
         return Estimate(y, 0.0, 0.0)
 
@@ -270,6 +269,7 @@ class SuperTwisting:
         return k1, k2 / dt, k3 / (dt * dt)
 
 
+@lru_cache(maxsize=64)  # the observer that watches is the same in every run of a rig
 def tune(
     context: ObserverContext,
     *,

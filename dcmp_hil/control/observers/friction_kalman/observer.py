@@ -132,6 +132,15 @@ class FrictionKalman:
         deviation = math.sqrt(variance) if variance > 0.0 else 0.0
         return d, f, deviation, s, trust[0], trust[5], float(self.sticks), float(self.steps)
 
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """Constants of rig and noises, as `struct dcmp_friction_setup` of the core."""
+        return (
+            *(self._f0, self._gravity, self._ku, self._f1, self._f_max, self._f1_variance, self._q),
+            *(self._half_count, self._restart_after, self._unchanged_variance),
+            *(self._edge_variance, self._d_noise),
+        )
+
     def retune(self, tuning: FrictionKalmanTuning) -> None:
         """Change the noises; the state stays."""
         self._d_noise = tuning.d_noise
