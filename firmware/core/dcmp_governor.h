@@ -160,11 +160,21 @@ static inline struct dcmp_reference dcmp_lead(struct dcmp_reference own, struct 
     return next;
 }
 
+/* A reference passes unchanged. */
+static inline struct dcmp_governed dcmp_passed(struct dcmp_governor next, struct dcmp_reference asked)
+{
+    struct dcmp_governed passed;
+    passed.next = next;
+    passed.reference = asked;
+    passed.own = false;
+    return passed;
+}
+
 /* Move on by `dt`, s, in steps of a few milliseconds, however long the period was. */
 static inline struct dcmp_governed dcmp_led(struct dcmp_governor now, struct dcmp_bounds bounds,
                                             struct dcmp_reference asked, real dt)
 {
-    struct dcmp_governed led = {now, asked, false};
+    struct dcmp_governed led = dcmp_passed(now, asked);
     if (!dcmp_finite_reference(asked)) {
         return led;
     }
@@ -227,8 +237,7 @@ static inline struct dcmp_governed dcmp_governor_bound(struct dcmp_governor befo
     }
     now.last = asked;
     now.has_last = true;
-    const struct dcmp_governed passed = {now, asked, false};
-    return passed;
+    return dcmp_passed(now, asked);
 }
 
 #endif

@@ -37,7 +37,7 @@ def _setup(bounds: Bounds) -> Array:
     return np.array([position, velocity, acceleration, braking, bounds.stop, strongest])
 
 
-def _asked(bounds: Bounds, seed: int, periods: int = 1500) -> list[Row]:
+def _asked(bounds: Bounds, seed: int, periods: int = 800) -> list[Row]:
     """Return references with jumps, rests, sines beyond the bounds, lost ticks, and what is no number."""
     rng = np.random.default_rng(seed)
     rows, tick = list[Row](), int(rng.integers(0, 1000))
@@ -104,7 +104,7 @@ def test_own_motion_has_the_bits_of_python_from_anywhere(core: Core, name: str) 
     bounds, rng = BOUNDS[name], np.random.default_rng(7)
     most = np.array(bounds[:3])
     rows = []
-    for _ in range(1500):
+    for _ in range(600):
         own = rng.choice([0.0, -1.0, 1.0, rng.uniform(-1, 1), rng.uniform(-0.01, 0.01)], 3) * most
         asked = rng.choice([0.0, -1.0, 1.0, 1.1, rng.uniform(-1, 1)], 3) * most
         near = own + rng.uniform(-1.5, 1.5, 3) * (5e-4, 0.02, 2.0)
