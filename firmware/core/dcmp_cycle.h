@@ -30,7 +30,7 @@ struct dcmp_r1 {
     bool began;
 };
 
-/* Take the next sample, and return the estimate there. Only a step with a small innovation pays for its gains. */
+/* Take the next sample, and return the estimate there. */
 static inline struct dcmp_estimate dcmp_r1_update(struct dcmp_r1 *now, const struct dcmp_r1_setup *setup, int64_t tick,
                                                   real y, real voltage, real period)
 {
@@ -44,16 +44,8 @@ static inline struct dcmp_estimate dcmp_r1_update(struct dcmp_r1 *now, const str
         now->state = dcmp_super_twisting_restart(y);
         return at_rest;
     }
-    const struct dcmp_step *step = &setup->steps[gap - 1];
-    const struct dcmp_super_twisting ahead =
-        dcmp_super_twisting_advance(now->state, setup->tuning.ku, *step, dt, y, voltage);
-    const real b = dcmp_innovation(ahead);
-    const real size = dcmp_magnitude(b);
-    struct dcmp_gains gains = {step->k1, step->k2, step->k3};
-    if (!(size >= setup->tuning.floor_from)) {
-        gains = dcmp_sliding_gains(size, setup->tuning, dt);
-    }
-    now->state = dcmp_super_twisting_correct(ahead, gains, b);
+    now->state =
+        dcmp_super_twisting_update(now->state, setup->tuning, setup->steps[gap - 1], dt, y, voltage);
     return dcmp_super_twisting_estimate(now->state, setup->tuning);
 }
 
