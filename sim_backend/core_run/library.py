@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TARGET = Target(
     "a run in the core",
     "librun.so",
-    ("core/*.h", "boards/simlib/run*.[ch]"),
+    ("core/*.h", "boards/simlib/simlib.h", "boards/simlib/run*.[ch]"),
     (*SHARED, "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
 _RETURNS = ("ROWS_FULL", "LOG_FULL", "BEGINS", "ASKS", "REFERENCES_USED", "REACHED", "OVER")
