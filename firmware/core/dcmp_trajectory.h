@@ -90,11 +90,10 @@ static inline struct dcmp_moment dcmp_moment_between(struct dcmp_trajectory now,
 
 #endif
 
-/* `since` and `length` of the soft start in s. */
+/* `since` it began, from 0 to below `length`, that of the soft start, in s. */
 static inline struct dcmp_fade dcmp_fade(real since, real length)
 {
-    const real ratio = since / length;
-    const real s = REAL(0.0) > ratio ? REAL(0.0) : ratio;
+    const real s = since / length;
     const real left = REAL(1.0) - s;
     const struct dcmp_fade fade = {
         s * s * s * (REAL(10.0) + s * (REAL(6.0) * s - REAL(15.0))),
