@@ -1,0 +1,2 @@
+#define DCMP_REAL_FLOAT
+#include "cycle_checks.c"
