@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from dcmp_hil import loop
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 CORE, PLAIN = "core", "plain"
 """Names of the engines, as `Result.engine` tells them."""
 ENGINE = "sim_backend.core_run.engine:CoreEngine"
-"""`module:Class` of the core, made as Class(); making it is cheap and raises nothing."""
+"""`module:Class` of the core, made as Class() once; it keeps no state, and making it raises nothing."""
 
 
 class Cycles(Protocol):
@@ -104,6 +105,12 @@ def loop_drive(stages: LoopStages, reason: str = "") -> RunDrive:
     return RunDrive(LoopCycles(stages), PLAIN, reason)
 
 
+@cache
+def _core() -> RunEngine:
+    make: Callable[[], RunEngine] = find_named(ENGINE, "engine")
+    return make()
+
+
 def fastest_drive(rig: Rig, stages: LoopStages, recorder: Recorder, *, looked_at: bool) -> RunDrive:
     """Return the core for a run in virtual time, or the loop where the core cannot run its stages.
 
@@ -114,8 +121,7 @@ def fastest_drive(rig: Rig, stages: LoopStages, recorder: Recorder, *, looked_at
     looked_at
         Whether sinks of the user look at the blocks: these are then cut as the loop cuts them.
     """
-    make: Callable[[], RunEngine] = find_named(ENGINE, "engine")
-    engine = make()
+    engine = _core()
     reason = engine.refusal(rig, stages, recorder)
     if reason:
         return loop_drive(stages, reason)

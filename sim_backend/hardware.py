@@ -216,11 +216,10 @@ def why_not_core(rig: Rig, engine: Engine, faults: PlantFaults = HEALTHY) -> str
     sim = rig.sim
     if engine.remark:
         return engine.remark
+    if sim.engine != "core":
+        return f'sim.engine is "{sim.engine}".'
     if not engine.core:
-        return (
-            f'the core has neither this plant nor details of it: sim.engine is "{sim.engine}", '
-            f'sim.integrator "{sim.integrator}".'
-        )
+        return f'the core has the plant "moreau" without details alone; sim.integrator is "{sim.integrator}".'
     if faults is not HEALTHY:
         return "the core has no faults of plant and encoder."
     return "the core has encoders with even edges alone." if sim.encoder_edge_counts else ""

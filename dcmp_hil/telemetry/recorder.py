@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Recorder", "Sink"]
 
 _SYNCHRONOUS_BLOCK_ROWS_MAX = 4096  # rows a block in virtual time, where no viewer waits, at most
+_LARGE_BLOCK_ROWS = 1 << 14  # 2.9 MB: what numpy costs a call is a small share
 _CAPACITY_ROWS = 1 << 15  # rows: 3 s at 10 kHz before a thread loses any
 _END_TIMEOUT_S = 2.0  # s that the end of a run waits for the thread
 
@@ -132,7 +133,7 @@ class Recorder:
         """
         self._batches = self._audience.ring = RowBatches(self._recent_max, self.further)
         if large:
-            self._every = self._left = _SYNCHRONOUS_BLOCK_ROWS_MAX
+            self._every = self._left = _LARGE_BLOCK_ROWS
 
     @property
     def room(self) -> int:

@@ -125,9 +125,18 @@ class Durations:
         known = values[~np.isnan(values)]
         if not len(known):
             return
-        bins = np.log(np.maximum(known, self._FIRST) / self._FIRST) * self._BINS_E
-        self.counts += np.bincount(np.minimum(bins.astype(np.int64), self._N - 1), minlength=self._N)
-        self._min, self._max = min(self._min, float(known.min())), max(self._max, float(known.max()))
+        least, most = float(known.min()), float(known.max())
+        self._min, self._max = min(self._min, least), max(self._max, most)
+        first, last = self._bins(np.array((least, most)))
+        if first == last:  # as in virtual time
+            self.counts[first] += len(known)
+        else:
+            self.counts += np.bincount(self._bins(known), minlength=self._N)
+
+    def _bins(self, values: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the numbers of the bins of durations, s."""
+        bins = np.log(np.maximum(values, self._FIRST) / self._FIRST) * self._BINS_E
+        return np.minimum(bins.astype(np.int64), self._N - 1)
 
     def percentiles(self) -> Percentiles:
         """Return the quantiles in us."""

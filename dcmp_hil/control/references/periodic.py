@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -18,11 +19,30 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
 
 
+_PROBED_ANGLES = 4096
+
+
 def _sine_and_cosine(angle: Vector) -> tuple[Vector, Vector]:
-    """Return both, by the functions of `math`: those of numpy have other last bits on some processors."""
+    """Return both, with the bits of `math`."""
+    return (np.sin(angle), np.cos(angle)) if _numpy_is_math() else _by_math(angle)
+
+
+def _by_math(angle: Vector) -> tuple[Vector, Vector]:
     angles = angle.tolist()
     count = len(angles)
     return np.fromiter(map(math.sin, angles), float, count), np.fromiter(map(math.cos, angles), float, count)
+
+
+@cache
+def _numpy_is_math() -> bool:
+    """Return whether the functions of numpy have the bits of `math` here.
+
+    Both are those of the C library, ten times as fast, or numpy has its own for the processor. Those differ
+    in the last bit of one value in ten.
+    """
+    angles = np.concatenate([np.linspace(-size, size, _PROBED_ANGLES) for size in (1.0, 10.0, 1e3)])
+    pairs = zip((np.sin(angles), np.cos(angles)), _by_math(angles), strict=True)
+    return all(bool((one == other).all()) for one, other in pairs)
 
 
 class SineWave(NamedTuple):
