@@ -88,7 +88,8 @@ void CHECK(limited)(double most, const double *x, double *out, uint32_t n);
 void CHECK(slewed)(double step, const double *rows, double *out, uint32_t n);        /* voltage, last */
 void CHECK(chatter)(const double *setup, const double *rows, double *out, uint32_t n); /* period, limit; tick, change */
 /* The setup in its order; tick, position, reference asked for and governed, whether it leads, demand, whether with authority
- * (else the demand is what is sent); out come the voltage, three times what is told, clamped, and the objection. */
+ * (else the demand is what is sent); out come the voltage, three times what is told, clamped, the objection, and
+ * the cycles that are left of a block. */
 void CHECK(limiter)(const double *setup, const double *rows, double *out, uint32_t n);
 
 /* dcmp_governor.h. The bounds; of each row come out the reference, whether it is the governor's own, and whether that leads. */

@@ -46,7 +46,7 @@ void CHECK(limiter)(const double *setup, const double *rows, double *out, uint32
     };
     struct dcmp_limiter state = dcmp_limiter_begin(&limits);
     real last = (real)0;
-    for (uint32_t i = 0; i < n; i++, rows += 11, out += 15) {
+    for (uint32_t i = 0; i < n; i++, rows += 11, out += 16) {
         const int64_t tick = (int64_t)rows[0];
         dcmp_limit_reference(&state, &limits, tick, (real)rows[1], reference_of(&rows[2]), reference_of(&rows[5]),
                              rows[8] > 0.0);
@@ -61,5 +61,6 @@ void CHECK(limiter)(const double *setup, const double *rows, double *out, uint32
         out[12] = (double)state.objection.tick;
         out[13] = (double)state.objection.first;
         out[14] = (double)state.objection.second;
+        out[15] = (double)state.left;
     }
 }

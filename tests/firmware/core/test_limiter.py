@@ -109,6 +109,7 @@ BORDERS = {
     "two blocks of half the limit each are none": ([9000.0, 1000.0, 1000.0, *[9000.0] * 8], True),
     "the first of those that are kept": ([900.0, 900.0, *[9000.0] * 9], False),
     "the last two": ([*[9000.0] * 9, 900.0, 900.0], False),
+    "a last pause of exactly the limit is none": ([*[9000.0] * 9, 1000.0, 1000.0], True),
     "bursts": ([*[9000.0] * 9, 0.0, 0.0] * 3 + [9000.0] * 6, True),
     "pauses as long as two bursts": (([9000.0] * 4 + [0.0] * 12) * 8, False),
 }
@@ -136,6 +137,7 @@ class Limits(NamedTuple):
     acceleration: float = math.inf
     error: float = math.inf
     chatter: float | None = None  # V/s, expected
+    block: int = 3  # cycles
 
 
 RIGS = {
@@ -145,6 +147,7 @@ RIGS = {
     "reference": Limits(position=2.0, velocity=8.0, acceleration=300.0),
     "tracking": Limits(position=2.0, velocity=8.0, error=0.5),
     "chatter": Limits(voltage=100.0, chatter=10.0),
+    "chatter, every cycle a block": Limits(voltage=100.0, chatter=10.0, block=1),
     "astray": Limits(error=0.5),
     "all": Limits(5.0, 160.0, 2.0, 8.0, 300.0, 0.5, 20.0),
 }
@@ -178,11 +181,13 @@ def _steps(seed: int) -> Array:
 
 
 def _limiter(limits: Limits, told: list[tuple[float, ...]]) -> Limiter:
-    *bounds, expected = limits
+    *bounds, expected, block = limits
     names = ("voltage", "slew", "position", "velocity", "acceleration", "error")
     limiter = Limiter(period=TIE_S, notify=told.append, **dict(zip(names, bounds, strict=True)))  # type: ignore[arg-type]
     if expected is not None:
-        limiter.watch_variation(Chatter(expected, TIE_S, 0.0))
+        judge = Chatter(expected, TIE_S, 0.0)
+        judge.block = block
+        limiter.watch_variation(judge)
     return limiter
 
 
@@ -218,9 +223,8 @@ def _in_python(limits: Limits, rows: Array) -> tuple[Array, Array]:
 
 def _setup(limits: Limits) -> Array:
     limiter = _limiter(limits, [])
-    expected = limits.chatter
-    judge = None if expected is None else Chatter(expected, TIE_S, 0.0)
-    allowed, block = (chatter_module.limit_V_s(expected or 0.0), judge.block) if judge else (0.0, 0)
+    judges = limits.chatter is not None
+    allowed, block = chatter_module.limit_V_s(limits.chatter or 0.0), limits.block if judges else 0
     bounds = limiter.bounds
     return np.array(
         [
@@ -239,11 +243,37 @@ def test_the_limiter_has_the_bits_of_python(core: Core, name: str, kind: str) ->
     told, causes = set(), set()
     for seed in range(10):
         given, wanted = _in_python(limits, _steps(seed))
-        assert same_bits(law("limiter", _setup(limits), given, width=15), wanted)
+        got = law("limiter", _setup(limits), given, width=16)
+        assert same_bits(got[:, :15], wanted)
+        assert got[:, 15].min() >= 0.0  # a count that is not used does not go down for ever
         told |= set(wanted[:, [1, 4, 7]].ravel().tolist())
         causes |= set(wanted[:, 11].tolist())
     if name == "all":
         assert told == set(range(7))
         assert causes >= {0.0, TRACKING, SATURATION}
-    if name == "chatter":
+    if limits.chatter == 10.0:
         assert CHATTER in causes
+
+
+def _same(core: Core, limits: Limits, rows: list[list[float]]) -> Array:
+    """Return what both say of a few rows."""
+    given, wanted = _in_python(limits, np.array(rows))
+    assert same_bits(Law(core)("limiter", _setup(limits), given, width=16)[:, :15], wanted)
+    return wanted
+
+
+def test_what_is_told_is_of_this_cycle(core: Core) -> None:
+    """The governor leads, and then is asked for no number, which it lets through."""
+    asked = [[k, 0.0, x, 0.0, 0.0, 0.0, 1.0] for k, x in enumerate([0.0, 2.5, math.nan])]
+    assert _same(core, RIGS["reference"], asked)[:, 1].tolist() == [0.0, 1.0, 0.0]
+
+
+def test_no_limit_of_the_slew_after_an_infinite_voltage(core: Core) -> None:
+    rows = [[k, 0.0, 0.0, 0.0, 0.0, demand, 1.0] for k, demand in enumerate([math.inf, math.nan, 1.0])]
+    assert _same(core, RIGS["none"], rows)[:, 0].tolist() == [math.inf, math.inf, 1.0]
+
+
+def test_a_demand_of_exactly_the_limit_stays_as_it_is(core: Core) -> None:
+    """With its sign, where the limit is 0."""
+    rows = [[k, 0.0, 0.0, 0.0, 0.0, demand, 1.0] for k, demand in enumerate([0.0, -0.0, 1.0, 0.0])]
+    assert not np.signbit(_same(core, Limits(voltage=0.0), rows)[0, 0])

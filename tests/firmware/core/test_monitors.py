@@ -70,6 +70,7 @@ def _filtered(limits: Array, rows: Array) -> Array:
         (512.0, 0.25, 0.5),  # as of a rig: usual is the larger of floor and speed times the period
         (512.0, 0.75, 0.75),
         (0.0, 0.25, 0.5),  # not of a rig: what is usual needs no further look
+        (0.0, 0.75, 0.25),  # nor this: the floor is what counts
         (math.inf, 0.0, math.inf),
     ],
 )

@@ -20,10 +20,13 @@ TIE_S = 2.0**-6  # a period of which every multiple is exact
 
 
 def _ticks(seed: int, longest: int) -> Array:
-    """Return ticks with gaps: most are one apart, some several, few far more."""
+    """Return ticks with gaps, from 2 on: most are one apart, some several, few far more."""
     draw = np.random.default_rng(seed)
     steps = draw.choice([1, 2, 3], 4000, p=[0.85, 0.14, 0.01])
-    return np.cumsum(np.where(draw.random(4000) < 0.005, draw.integers(1, longest, 4000), steps)) - 1.0
+    steps[:60] = 1
+    far = draw.random(4000) < 0.005
+    far[:60] = False
+    return np.cumsum(np.where(far, draw.integers(1, longest, 4000), steps)) + 1.0
 
 
 @pytest.mark.parametrize("period", PERIODS_S)
