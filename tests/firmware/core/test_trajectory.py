@@ -79,3 +79,11 @@ def test_end_of_the_soft_start_is_the_instant_that_python_rounds(core: Core) -> 
         setup = np.array([period, length, period, begins, HELD, FROM])
         assert same_bits(Law(core)("trajectory", setup, rows, width=9), wanted)
     assert apart == {True, False}
+
+
+@pytest.mark.parametrize("kind", ["", "float_"])
+def test_soft_start_is_over_at_its_end(core: Core, kind: str) -> None:
+    period, small = 2.0**-10, 2.0**-30
+    setup = np.array([period, 0.25, 0.0, 0.0, HELD, FROM])
+    rows = np.array([[0.0, *[0.0] * 9], [256.0, *[small, 0.0, 0.0] * 3]])
+    assert Law(core, kind)("trajectory", setup, rows, width=9)[1, 0] == small
