@@ -1,4 +1,4 @@
-"""The engine for everything that a rig may be: each run by the loop itself, in virtual time."""
+"""The engine for everything that a rig may be: one run after another, each by the core or by the loop."""
 
 from __future__ import annotations
 
@@ -28,10 +28,12 @@ class PlainLoop:
     ----------
     faults
         Faults that are injected into every run, as for `dcmp_hil.run`.
+    plain
+        Whether the loop of the host runs also where the core could.
     """
 
-    def __init__(self, faults: Sequence[str] = ()) -> None:
-        self._faults = tuple(faults)
+    def __init__(self, faults: Sequence[str] = (), *, plain: bool = False) -> None:
+        self._faults, self._plain = tuple(faults), plain
 
     @staticmethod
     def refusal(rig: Rig) -> str:
@@ -46,7 +48,13 @@ class PlainLoop:
 
     def _run(self, rig: Rig, duration_s: float) -> RunOutcome:
         session = Session(
-            rig, duration=duration_s, fast=True, keep_columns=False, stop=_Unstopped(), faults=self._faults
+            rig,
+            duration=duration_s,
+            fast=True,
+            keep_columns=False,
+            stop=_Unstopped(),
+            faults=self._faults,
+            plain=self._plain,
         )
         tripped, time, cause = False, math.nan, ""
         try:

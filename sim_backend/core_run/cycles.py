@@ -89,7 +89,7 @@ class CoreCycles:
         }
         progress["until"], progress["fresh"] = until, 1
         while True:
-            self._make_room(stop)
+            self._make_room()
             reason = returns[self._call()]
             if reason in needs:
                 needs[reason]()
@@ -127,11 +127,10 @@ class CoreCycles:
     def _number(self, name: str) -> float:
         return float(self._progress[name][0])
 
-    def _make_room(self, stop: StopFlag) -> None:
-        """Begin a new block where the last one is full; a request to stop leaves room for one cycle."""
+    def _make_room(self) -> None:
+        """Begin a new block where the last one is full."""
         if self._filled == len(self._block):
-            once = stop.requested and not self._is_stopping
-            self._block, self._filled = np.empty((1 if once else self._recorder.room, self._width)), 0
+            self._block, self._filled = np.empty((self._recorder.room, self._width)), 0
 
     def _call(self) -> int:
         """Run cycles until the block is full, or something is needed; take the events."""

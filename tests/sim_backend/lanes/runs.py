@@ -88,5 +88,5 @@ def drawn(number: int, overrides: Sequence[str], seed: int = 1) -> list[Rig]:
 
 def unequal(engine: LaneEngine, rigs: Sequence[Rig], duration: float) -> list[tuple[RunOutcome, RunOutcome]]:
     """Return the pairs of outcomes, by lanes and by the plain loop, that differ in any bit."""
-    found = zip(engine.run(rigs, duration), PlainLoop().run(rigs, duration), strict=True)
+    found = zip(engine.run(rigs, duration), PlainLoop(plain=True).run(rigs, duration), strict=True)
     return [(ours, plain) for ours, plain in found if repr(ours) != repr(plain)]
