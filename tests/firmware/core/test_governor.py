@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tests.firmware.bench import Core
 
 T = 1e-3
+WIDE = Bounds(100.0, 100.0, 100.0, 100.0)
 NONE = Reference(math.nan, 0.0, 0.0)
 BOUNDS = {
     "nominal": Bounds(5.969, 19.0, 44.8, 27.0, 54.0),
@@ -128,45 +129,66 @@ def test_own_motion_at_the_ties(core: Core) -> None:
         Reference(0.0, 0.0, 2.0),
         Reference(-5e-4, -0.02, -2.0),
     ]
+    met += [Reference(*(1.0005 * part for part in each)) for each in met]  # not met
+    met += [Reference(1e308, 1e308, 0.0), Reference(1e308, 0.0, 1e308)]  # their sums are infinite
     rows = [(1, zero, each) for each in met]
     rows += [(1, each, zero) for each in met]
     edge = 4.0 - stop  # from here a stop from 1 rad/s ends at the bound
     for x, v in ((edge, 1.0), (-edge, -1.0), (4.0, 0.0), (-4.0, 0.0), (0.0, 2.0), (0.0, -2.0)):
         own = Reference(x, v, 0.0)
         rows += [(ticks, own, asked) for asked in (own, zero, Reference(-x, 0.0, 0.0)) for ticks in (0, 1)]
-    near = 0.5 * bounds.braking / 25.0
-    rows += [(1, zero, Reference(sign * near, 0.0, 0.0)) for sign in (1.0, -1.0)]
     got, wanted = _led(core, bounds, rows)
     assert same_bits(got, wanted)
 
 
-def test_jumps_at_the_ties(core: Core) -> None:
-    """A jump of exactly the largest size, speed, way beyond it, and pause is left to the controller."""
-    rows: dict[str, tuple[Bounds, list[Row]]] = {}
+def test_own_motion_from_where_its_way_begins_to_bend(core: Core) -> None:
+    for braking in (0.37, 0.74, 1.48):  # the two formulas of the way differ there in the last bit
+        near = 0.5 * braking / 25.0
+        rows = [
+            (1, Reference(0.0, sign * 4.5 * near, 0.0), Reference(sign * near, 0.0, 0.0))
+            for sign in (1.0, -1.0)
+        ]
+        got, wanted = _led(core, Bounds(4.0, 2.0, 8.0, braking, 54.0), rows)
+        assert same_bits(got, wanted)
 
-    def jumps(name: str, bounds: Bounds, *ways: tuple[int, float]) -> None:
-        rows[name] = bounds, [(float(tick), Reference(x, 0.0, 0.0)) for tick, x in ways]
 
-    wide = Bounds(100.0, 100.0, 100.0, 100.0)
-    jumps("size", wide, (0, 0.0), (1, 2.0), (501, 0.0), (1001, 2.0 + 2.0**-40))
-    jumps("pause", wide, (0, 0.0), (1, 1.0), (500, 0.0), (1001, 1.0))
-    jumps("pause is over", wide, (0, 0.0), (1, 1.0), (501, 0.0))
-    jumps("speed", Bounds(100.0, 3.0, 100.0, 100.0, 6.0), (0, 0.0), (1, 1.0))
-    jumps("too fast", Bounds(100.0, 3.0, 100.0, 100.0, 6.0), (0, 0.0), (1, 1.0 + 2.0**-40))
-    jumps("way", Bounds(1.4, 100.0, 100.0, 100.0), (0, 0.0), (1, 1.0))
-    jumps("too far", Bounds(1.4, 100.0, 100.0, 100.0), (0, 0.0), (1, 1.0 + 2.0**-40))
-    jumps("slow enough", Bounds(100.0, 0.5, 100.0, 100.0, 54.0), (0, 0.0), (1000, 0.5))
-    for name, (bounds, asked) in rows.items():
-        wanted = _in_python(bounds, asked, T)
-        table = np.array([(tick, *each) for tick, each in asked])
-        assert same_bits(Law(core)("governor", _setup(bounds), T, table, width=5), wanted), name
-        assert wanted[1, 3] == (name.startswith("too")), name
+JUMPS: dict[str, tuple[Bounds, float, list[tuple[int, float]]]] = {
+    "size": (WIDE, 0.0, [(1, 2.0)]),
+    "too long": (WIDE, 1.0, [(1, 2.0 + 2.0**-40)]),
+    "speed": (Bounds(100.0, 3.0, 100.0, 100.0, 6.0), 0.0, [(1, 1.0)]),
+    "too fast": (Bounds(100.0, 3.0, 100.0, 100.0, 6.0), 1.0, [(1, 1.0 + 2.0**-40)]),
+    "unknown speed": (Bounds(100.0, 0.5, 100.0, 100.0), 0.0, [(1, 1.0)]),
+    "way": (Bounds(1.4, 100.0, 100.0, 100.0), 0.0, [(1, 1.0)]),
+    "too far": (Bounds(1.4, 100.0, 100.0, 100.0), 1.0, [(1, 1.0 + 2.0**-40)]),
+    "pause": (WIDE, 0.0, [(1, 1.0), (513, 0.0)]),
+    "too early": (WIDE, 1.0, [(1, 1.0), (512, 0.0)]),
+    "no jump": (WIDE, 0.0, [(1, 1.0), (2, 1.0 + 100.0 * 2.0**-10)]),
+}
+"""Bounds, whether the last jump is led, and jumps: tick and position."""
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_jump_at_a_tie_is_left_to_the_controller(core: Core, name: str) -> None:
+    bounds, led, jumps = JUMPS[name]
+    asked, x = [(0.0, Reference(0.0, 0.0, 0.0))], 0.0
+    for tick, target in jumps:
+        asked += [(tick - 1.0, Reference(x, 0.0, 0.0)), (float(tick), Reference(target, 0.0, 0.0))]
+        x = target
+    wanted = _in_python(bounds, asked, 2.0**-10)
+    table = np.array([(tick, *each) for tick, each in asked])
+    assert same_bits(Law(core)("governor", _setup(bounds), 2.0**-10, table, width=5), wanted)
+    assert wanted[-1, 3] == led
+    assert not wanted[:-1, 3].any()
 
 
 def test_first_reference_beyond_the_bounds_begins_at_the_bound(core: Core) -> None:
     bounds = BOUNDS["nominal"]
-    for x in (7.0, -7.0, 3.0):
-        rows = [(5.0, NONE), (5.0, Reference(x, 90.0, 0.0)), (6.0, Reference(x, 0.0, 0.0))]
+    for x, v in ((7.0, 90.0), (-7.0, 90.0), (3.0, 90.0), (5.9, 5.0)):
+        rows = [(5.0, NONE), (5.0, Reference(x, v, 0.0)), (6.0, Reference(x, 0.0, 0.0))]
+        rows += [
+            (7.0, Reference(math.copysign(min(5.969, abs(x)), x), 0.0, 0.0)),
+            (8.0, Reference(0.0, 0.0, 0.0)),
+        ]
         for asked in (rows, rows[1:]):
             table = np.array([(tick, *each) for tick, each in asked])
             got = Law(core)("governor", _setup(bounds), T, table, width=5)
