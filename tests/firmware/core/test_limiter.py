@@ -241,7 +241,7 @@ def _setup(limits: Limits) -> Array:
 def test_the_limiter_has_the_bits_of_python(core: Core, name: str, kind: str) -> None:
     limits, law = RIGS[name], Law(core, kind)
     told, causes = set(), set()
-    for seed in range(10):
+    for seed in range(8):
         given, wanted = _in_python(limits, _steps(seed))
         got = law("limiter", _setup(limits), given, width=16)
         assert same_bits(got[:, :15], wanted)
