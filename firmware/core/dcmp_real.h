@@ -30,8 +30,6 @@ typedef uint32_t dcmp_word;
 #define DCMP_LN2_2 REAL(1.4286068203094173e-06)
 #define DCMP_SQUARE_ROOT __builtin_sqrtf
 #define DCMP_RANDOM_UNIT REAL(0x1p-24)
-#define DCMP_ROOT_SHIFT 2u             /* bias + shift is a multiple of 3 */
-#define DCMP_ROOT_SCALE 43u            /* a third of it */
 #else
 typedef double real;
 typedef uint64_t dcmp_word;
@@ -49,8 +47,6 @@ typedef uint64_t dcmp_word;
 #define DCMP_LN2_2 REAL(7.371002565167799e-13)
 #define DCMP_SQUARE_ROOT __builtin_sqrt
 #define DCMP_RANDOM_UNIT REAL(0x1p-53)
-#define DCMP_ROOT_SHIFT 0u
-#define DCMP_ROOT_SCALE 341u
 #endif
 
 #define DCMP_MANTISSA ((((dcmp_word)1) << DCMP_MANTISSA_BITS) - 1u)
