@@ -27,7 +27,7 @@ unexport PYTHONPATH PYTHONHOME
 export PIP_USER = 0
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware bench soak soak-long encoders pictures reversal walk numbers panel-hour chatter stop-bars lock lockcheck clean
+.PHONY: help run test check quick format generate pytest faults fuzz limits mutants firmware chip bench soak soak-long encoders pictures reversal walk numbers panel-hour chatter stop-bars lock lockcheck clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -84,6 +84,9 @@ mutants: $(DEV) ## break the safety C piece by piece: a test notices, or tests/f
 
 firmware: $(DEV) ## build the boards with a chip into dist/firmware: ELF, images, maps, hashes; ARGS="--boards FOLDER" for boards of one's own
 	@$(BIN)/python -m tools.artefact $(ARGS)
+
+chip: $(DEV) ## the law in single precision on an emulated Cortex-M4: a million samples of each part to the bit, and what a step costs
+	@DCMP_CHIP_SAMPLES=1000000 $(BIN)/python -m pytest -n 0 -q tests/target/test_chip.py tests/target/test_chip_loop.py $(ARGS)
 
 numbers: $(DEV) ## type 1,000 random numbers into rig.toml and `set`: no simulated arm leaves its limits
 	@$(BIN)/python -m tools.typed_numbers $(ARGS)
