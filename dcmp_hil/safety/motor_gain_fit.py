@@ -88,9 +88,7 @@ class MotorGainFit:
         n33 += variance / (usual * usual)
         l2, l3 = n12 / n11, n13 / n11
         d22, d23, d33 = n22 - l2 * n12, n23 - l2 * n13, n33 - l3 * n13
-        if not d22 > 0.0:
-            return 0.0, usual
-        share = d23 / d22
+        share = d23 / d22  # d22 is positive, or no number: n11 is more than the number of samples
         d = d33 - share * d23
         if not d > 0.0:
             return 0.0, usual

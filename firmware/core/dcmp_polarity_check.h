@@ -114,7 +114,7 @@ static inline struct dcmp_motor_gain dcmp_fitted_gain(struct dcmp_gain_sums sums
     const real d33 = n33 - l3 * sums.n13;
     const real l = d23 / d22;
     const real d = d33 - l * d23;
-    if (!(d22 > REAL(0.0) && d > REAL(0.0))) { /* too large for sums: what was expected before a sample */
+    if (!(d > REAL(0.0))) { /* too large for sums: what was expected before a sample */
         const struct dcmp_motor_gain unknown = {REAL(0.0), usual};
         return unknown;
     }

@@ -137,6 +137,7 @@ def test_check_has_the_bits_of_python(core: Core, name: str) -> None:
     rows, wanted, _ = _probed(rig, 3)
     got = _in_c(core, rig, rows)
     assert same_bits(got[:, [STAGE, CAUSE, 4, 5, 6, FOUND]], wanted)
+    assert not got[got[:, CAUSE] == 0.0][:, [2, 3, 8]].any()
 
 
 def test_every_cause_was_among_them() -> None:
@@ -198,10 +199,13 @@ def test_stages_at_the_ties(core: Core) -> None:
         [(110.0, 0.001, 0.9), (120.0, 0.02, 0.9), (121.0, 0.02, 0.9), (140.0, -0.08, -1.0)],
         [(110.0, 0.001, 0.89), (120.0, 0.01, 0.9), (121.0, 0.02, 0.9), (142.0, -0.03, -1.0)],
         [(110.0, 0.008, -0.5), (111.0, 0.02, 0.95), (130.0, 0.0, 0.0), (250.0, -0.02, 0.0)],
+        [(110.0, 0.001, 0.5), (120.0, 0.012797, 1.0), (121.0, 0.012, 1.0), (230.0, 0.0, -1.0)],
+        [(110.0, 0.001, 0.5), (120.0, 0.012803, 1.0), (121.0, 0.012, -1.0), (230.0, 0.0, -1.0)],
         [(100.0, 0.008, 0.5), (100.0, 0.03, 1.0), (100.0, 0.0, 0.0), (250.0, -0.02, 0.0)],
     ]
-    for end in ends:
-        rows = np.array(watched + end)
+    moved = [(0.0, 0.0, 0.0), (50.0, 0.02001, 0.0)]
+    for each in (moved, *(watched + end for end in ends)):
+        rows = np.array(each)
         got = _in_c(core, rig, rows)
         assert same_bits(got[:, [CAUSE, 4, 5, 6]], _stages(rig, rows.tolist()))
 
