@@ -159,6 +159,9 @@ class Ride:
         self._check_end(kept[-1].tolist())
 
     def _check_end(self, last: list[float]) -> None:
+        chatter = self.supervisor.limiter.chatter
+        seen = list(chatter.samples)[-1:] if chatter else []
+        assert (last[17] == 1.0) == ([one.t for one in seen] == [self.seen.cycles[-1].sample.t])
         assert PHASES[int(last[10])] is self.supervisor.phase
         assert (last[11] == 1.0) == (self.trip is not None)
         if self.trip is None:
@@ -205,7 +208,7 @@ RIDES: Mapping[str, tuple[str, ...]] = {
     "governed": (AT_ONCE, "reference.amplitude_rad=5", "supervisor.position_limit_rad=4"),
     "limits": ("amplifier.slew_V_s=50", "amplifier.voltage_limit_V=2", "sim.plant.f1_rad_s2=8"),
     "stuck": ("sim.plant.f1_rad_s2=60",),
-    "falls": ("sim.position_rad=3.0",),
+    "falls": ("sim.position_rad=1.5",),
     "strong": ("sim.plant.ku_rad_s2_V=14", 'supervisor.probe="off"'),
     "weak": ("sim.plant.ku_rad_s2_V=0.5",),
     "too far": (AT_ONCE, "supervisor.position_limit_rad=0.9", "sim.position_rad=1.2"),
