@@ -49,6 +49,31 @@ static inline struct dcmp_estimate dcmp_r1_update(struct dcmp_r1 *now, const str
     return dcmp_super_twisting_estimate(now->state, setup->tuning);
 }
 
+/* ------------------------------------------------------------------------------------------ the friction filter, in ticks */
+
+/* All 0: no sample yet. */
+struct dcmp_friction_clock {
+    int64_t tick; /* of the last sample */
+    int64_t edge; /* of the last one that passed an edge */
+    bool began;
+};
+
+static inline struct dcmp_friction_times dcmp_friction_times_at(struct dcmp_friction_clock clock, int64_t tick,
+                                                                real period)
+{
+    const struct dcmp_friction_times none = {REAL(0.0), REAL(0.0)};
+    const struct dcmp_friction_times times = {dcmp_elapsed(clock.tick, tick, period),
+                                              dcmp_elapsed(clock.edge, tick, period)};
+    return clock.began ? times : none;
+}
+
+/* The clock after the sample of a tick. */
+static inline struct dcmp_friction_clock dcmp_friction_timed(struct dcmp_friction_clock clock, int64_t tick, bool edge)
+{
+    const struct dcmp_friction_clock next = {tick, edge ? tick : clock.edge, true};
+    return next;
+}
+
 /* -------------------------------------------------------------------------------------------------------------- a cycle */
 
 /* Of the device at one tick. */
@@ -86,6 +111,7 @@ struct dcmp_cycle {
     struct dcmp_outliers outliers;
     struct dcmp_r1 own;
     struct dcmp_friction_kalman friction;
+    struct dcmp_friction_clock clock; /* of the friction filter */
     struct dcmp_r1 second;
     struct dcmp_watch watch;
     struct dcmp_governor governor;
@@ -103,10 +129,10 @@ struct dcmp_cycle {
     struct dcmp_notes notes;         /* of this cycle */
 };
 
-/* The state before the first sample; `none` is NaN: the friction filter has no sample yet. */
-static inline struct dcmp_cycle dcmp_cycle_begin(const struct dcmp_cycle_setup *setup, real none)
+/* The state before the first sample. */
+static inline struct dcmp_cycle dcmp_cycle_begin(const struct dcmp_cycle_setup *setup)
 {
-    const struct dcmp_cycle first = {.friction = {.t = none}, .limiter = dcmp_limiter_begin(&setup->limiter)};
+    const struct dcmp_cycle first = {.limiter = dcmp_limiter_begin(&setup->limiter)};
     return first;
 }
 
@@ -125,8 +151,10 @@ static inline struct dcmp_estimate dcmp_cycle_observe(struct dcmp_cycle *now, co
     if (!setup->knows_friction) {
         return dcmp_r1_update(&now->own, &setup->own, sample.tick, sample.position, sample.voltage, setup->period);
     }
-    const real t = dcmp_instant(sample.tick, setup->period);
-    now->friction = dcmp_friction_kalman_update(now->friction, setup->friction, t, sample.position, sample.voltage);
+    const struct dcmp_friction_times times = dcmp_friction_times_at(now->clock, sample.tick, setup->period);
+    now->friction =
+        dcmp_friction_kalman_update(now->friction, setup->friction, times, sample.position, sample.voltage);
+    now->clock = dcmp_friction_timed(now->clock, sample.tick, now->friction.edge);
     return now->friction.estimate;
 }
 

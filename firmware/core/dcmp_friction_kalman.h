@@ -85,13 +85,18 @@ struct dcmp_friction_kalman {
     struct dcmp_covariance covariance;
     struct dcmp_trust trust;
     struct dcmp_estimate estimate;
-    real t;         /* s, of the last sample; NaN before the first one */
-    real y;         /* rad, there */
+    real y;         /* rad, of the last sample */
     real first;     /* rad, at the start */
     real count;     /* a whole number */
-    real edge_t;    /* s, of the last edge */
     uint32_t steps; /* of the disturbance, that were assumed since the start */
     bool sticks;
+    bool edge;      /* the last sample passed one, or was the first */
+};
+
+/* When a sample comes. Differences only: the filter's owner has the clock, in ticks where seconds are not exact. */
+struct dcmp_friction_times {
+    real step; /* s, since the last sample; 0 or less where there is none */
+    real edge; /* s, since the last sample that passed an edge */
 };
 
 #define DCMP_SLOPE_LEAK REAL(0.3)         /* 1/s */
@@ -406,9 +411,11 @@ static inline struct dcmp_friction_kalman dcmp_corrected(struct dcmp_friction_ka
 
 /* Measure by the newest edge that was passed; an arm that stuck is released by it. */
 static inline struct dcmp_friction_kalman dcmp_by_edge(struct dcmp_friction_kalman filter,
-                                                       struct dcmp_friction_setup setup, real rise, real step)
+                                                       struct dcmp_friction_setup setup, real rise,
+                                                       struct dcmp_friction_times times)
 {
     struct dcmp_friction_kalman next = filter;
+    const real step = times.step;
     const real x2 = filter.state.x2;
     const real speed = dcmp_magnitude(x2);
     const real span = speed * step > setup.q ? setup.q / speed : step;
@@ -417,13 +424,12 @@ static inline struct dcmp_friction_kalman dcmp_by_edge(struct dcmp_friction_kalm
     const real travel = x2 * span;
     const struct dcmp_measured measured = {
         e, REAL(-0.5) * span, filter.trust.scatter * setup.edge_variance + travel * travel / REAL(12.0), true};
-    const real since = filter.t - filter.edge_t;
-    next.edge_t = filter.t;
+    next.edge = true;
     if (filter.sticks && e * e > DCMP_RELEASE_GATE * (filter.covariance.p00 + measured.r)) {
         const real shortest = REAL(2.0) * step;
         next.sticks = false;
         next.state.d = (e < REAL(0.0) ? -filter.state.f : filter.state.f) - (filter.state.a - filter.state.d);
-        next.state.x2 = REAL(0.5) * e / (shortest > since ? shortest : since);
+        next.state.x2 = REAL(0.5) * e / (shortest > times.edge ? shortest : times.edge);
         next.covariance = dcmp_released(filter.covariance, e, next.state.x2, filter.state.f);
     }
     return dcmp_corrected(next, setup, measured, step);
@@ -441,7 +447,7 @@ static inline struct dcmp_noise dcmp_friction_noise(struct dcmp_trust trust, rea
 }
 
 /* Begin at rest where the arm is, as if nothing had been seen before. */
-static inline struct dcmp_friction_kalman dcmp_friction_begin(struct dcmp_friction_setup setup, real t, real y)
+static inline struct dcmp_friction_kalman dcmp_friction_begin(struct dcmp_friction_setup setup, real y)
 {
     const struct dcmp_friction_kalman first = {
         .state = {.x1 = y, .f = setup.f1},
@@ -452,21 +458,20 @@ static inline struct dcmp_friction_kalman dcmp_friction_begin(struct dcmp_fricti
                        .p44 = DCMP_SLOPE_VARIANCE},
         .trust = {.m = REAL(1.0), .slope_m = REAL(1.0), .scatter = REAL(1.0)},
         .estimate = {.position = y},
-        .t = t,
         .y = y,
         .first = y,
-        .edge_t = t,
+        .edge = true,
     };
     return first;
 }
 
 /* Estimate no number from here on: one that came was not finite. */
-static inline struct dcmp_friction_kalman dcmp_friction_lose(struct dcmp_friction_kalman filter, real t, real none)
+static inline struct dcmp_friction_kalman dcmp_friction_lose(struct dcmp_friction_kalman filter, real none)
 {
     struct dcmp_friction_kalman next = filter;
     const struct dcmp_motion lost = {none, none, none, none, none, none, none};
     const struct dcmp_estimate no_estimate = {none, none, none};
-    next.t = t;
+    next.edge = false;
     next.state = lost;
     next.estimate = no_estimate;
     return next;
@@ -474,7 +479,8 @@ static inline struct dcmp_friction_kalman dcmp_friction_lose(struct dcmp_frictio
 
 /* Correct the prediction by a count that rose, or by one that stayed where the state says that it left. */
 static inline struct dcmp_friction_kalman dcmp_friction_measure(struct dcmp_friction_kalman filter,
-                                                                struct dcmp_friction_setup setup, real y, real step)
+                                                                struct dcmp_friction_setup setup, real y,
+                                                                struct dcmp_friction_times times)
 {
     struct dcmp_friction_kalman next = filter;
     const real off = y - filter.state.x1;
@@ -486,40 +492,41 @@ static inline struct dcmp_friction_kalman dcmp_friction_measure(struct dcmp_fric
     }
     next.y = y;
     if (rise != REAL(0.0)) {
-        return dcmp_by_edge(next, setup, rise, step);
+        return dcmp_by_edge(next, setup, rise, times);
     }
     if (off > setup.half_count || off < -setup.half_count) {
         const real bound = off < REAL(0.0) ? -setup.half_count : setup.half_count;
         const struct dcmp_measured measured = {off - bound, REAL(0.0), filter.trust.scatter * setup.unchanged_variance,
                                                false};
-        return dcmp_corrected(next, setup, measured, step);
+        return dcmp_corrected(next, setup, measured, times.step);
     }
-    next.trust = dcmp_calmed(filter.trust, step);
+    next.trust = dcmp_calmed(filter.trust, times.step);
     return next;
 }
 
-/* Advance to the sample at t, s, over the voltage really applied, V, and correct by its count, y in rad. Time has to advance. */
+/* Advance to the next sample over the voltage really applied, V, and correct by its count, y in rad. Time has to advance. */
 static inline struct dcmp_friction_kalman dcmp_friction_kalman_update(struct dcmp_friction_kalman filter,
-                                                                      struct dcmp_friction_setup setup, real t,
-                                                                      real y, real voltage)
+                                                                      struct dcmp_friction_setup setup,
+                                                                      struct dcmp_friction_times times, real y,
+                                                                      real voltage)
 {
-    const real step = t - filter.t;
+    const real step = times.step;
     if (!(step > REAL(0.0) && step <= setup.restart_after)) {
-        return dcmp_friction_begin(setup, t, y);
+        return dcmp_friction_begin(setup, y);
     }
     const real none = (filter.state.x1 + filter.state.x2 + y + voltage) * REAL(0.0);
     if (none != REAL(0.0)) {
-        return dcmp_friction_lose(filter, t, none);
+        return dcmp_friction_lose(filter, none);
     }
     const real u = setup.ku * voltage;
     struct dcmp_friction_kalman next = filter;
-    next.t = t;
+    next.edge = false;
     next.state = dcmp_moved(filter.state, step, u, setup.f0, setup.gravity);
     next.sticks = next.state.direction == REAL(0.0);
     const struct dcmp_noise noise = dcmp_friction_noise(filter.trust, next.state.x2, step, setup.d_noise);
     next.covariance = next.sticks ? dcmp_stuck(filter.covariance, step, noise)
                                   : dcmp_slipped(filter.covariance, next.state, step, setup.f0, setup.gravity, noise);
-    next = dcmp_friction_measure(next, setup, y, step);
+    next = dcmp_friction_measure(next, setup, y, times);
     const real x2 = next.state.x2;
     const real friction = x2 > REAL(0.0) ? next.state.f : -next.state.f;
     const real moving = next.state.d - setup.gravity * dcmp_sine(next.state.x1) - friction;

@@ -37,7 +37,7 @@ static void put_cycle(const struct dcmp_cycle *now, double *out)
 void CHECK(cycle)(const double *parameters, const double *rows, double *out, uint32_t n)
 {
     const struct dcmp_cycle_setup setup = run_setup_of((const struct run_parameters *)(const void *)parameters);
-    struct dcmp_cycle now = dcmp_cycle_begin(&setup, REAL(__builtin_nan("")));
+    struct dcmp_cycle now = dcmp_cycle_begin(&setup);
     for (uint32_t i = 0; i < n; i++, rows += 8, out += ROW) {
         const struct dcmp_measurement sample = {(int64_t)rows[0], (real)rows[1], (real)rows[2]};
         const struct dcmp_reference reference = {(real)rows[5], (real)rows[6], (real)rows[7]};

@@ -75,11 +75,10 @@ void CHECK(by_edge)(const double *setup, const double *rows, double *out, uint32
                            (real)p[8], (real)p[9], (real)p[10], (real)p[11], (real)p[12], (real)p[13], (real)p[14]},
             .trust = {(real)trust[0], (real)trust[1], (real)trust[2], (real)trust[3], (real)trust[4], (real)trust[5]},
             .sticks = x[27] > 0.0,
-            .t = (real)x[28],
-            .edge_t = (real)x[29],
             .y = (real)x[30],
         };
-        filter = dcmp_by_edge(filter, setup_of(setup), (real)x[31], (real)x[32]);
+        const struct dcmp_friction_times times = {(real)x[32], (real)x[28] - (real)x[29]};
+        filter = dcmp_by_edge(filter, setup_of(setup), (real)x[31], times);
         put(every, &filter, filter.estimate);
         for (uint32_t k = 0; k < EDGE_OUT_NUMBERS; k++) {
             out[EDGE_OUT_NUMBERS * i + k] = every[k + 3u];
@@ -91,11 +90,16 @@ void CHECK(friction_kalman)(const double *setup, double period, uint32_t delay, 
                             uint32_t n)
 {
     const struct dcmp_friction_setup by = setup_of(setup);
-    struct dcmp_friction_kalman filter = dcmp_friction_begin(by, (real)rows[0], (real)rows[1]);
+    struct dcmp_friction_kalman filter = dcmp_friction_begin(by, (real)rows[1]);
+    double before = rows[0];
+    double edge = rows[0];
     for (uint32_t i = 0; i < n; i++) {
         const double *row = &rows[5u * i];
         if (i > 0u) {
-            filter = dcmp_friction_kalman_update(filter, by, (real)row[0], (real)row[1], (real)row[2]);
+            const struct dcmp_friction_times times = {(real)(row[0] - before), (real)(row[0] - edge)};
+            filter = dcmp_friction_kalman_update(filter, by, times, (real)row[1], (real)row[2]);
+            before = row[0];
+            edge = filter.edge ? row[0] : edge;
         }
         put(&out[OUT_NUMBERS * i], &filter,
             dcmp_friction_ahead(filter, by, delay == 1u, (real)period, (real)row[3], (real)row[4]));

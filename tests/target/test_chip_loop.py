@@ -9,8 +9,8 @@ import pytest
 
 from dcmp_hil import run
 from tests.helpers import bench
-from tests.target.chip_image import closed_loop
-from tests.target.chip_rigs import FED_FORWARD, parameters
+from tests.target.chip_image import closed_loop, here
+from tests.target.chip_rigs import FED_FORWARD, RIGS, parameters
 
 if TYPE_CHECKING:
     import ctypes
@@ -21,6 +21,7 @@ PHASES = (0.0, 1.0 / 3.0, 2.0 / 3.0)  # counts
 FAST = ("loop.rate_hz=10000", FED_FORWARD)
 TRACKING_MAX = 0.08  # mrad, at 10 kHz
 APART_MAX = 0.05
+DAY_TICKS = 86_400_000
 
 
 def _rms(errors: Any) -> float:
@@ -62,3 +63,12 @@ def test_at_10_khz_with_known_friction_it_follows_closely(
     figure(f"float loop at 10 kHz, friction fed forward: {single:.4f} mrad, in double {double:.4f}")
     assert single <= TRACKING_MAX
     assert single == pytest.approx(double, rel=APART_MAX)
+
+
+def test_a_loop_that_runs_for_a_day_is_that_of_its_first_second(library: ctypes.CDLL) -> None:
+    """Seconds in single precision would have lost the sample's period by then; ticks do not."""
+    for settings in RIGS:
+        loop = closed_loop(library, parameters(settings), 2000)
+        later = loop.order.rows.copy()
+        later["tick"] += DAY_TICKS
+        assert np.array_equal(here(library, loop.order._replace(rows=later)), loop.results)

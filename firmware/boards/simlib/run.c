@@ -81,7 +81,7 @@ void run_begin(void *state, const struct run_parameters *parameters)
         .due = NONE,
     };
     *run = first;
-    run->cycle = dcmp_cycle_begin(&run->setup, NONE);
+    run->cycle = dcmp_cycle_begin(&run->setup);
 }
 
 /* -------------------------------------------------------------------------------------------------------- the reference */

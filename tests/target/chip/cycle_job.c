@@ -53,7 +53,7 @@ void cycle_job(const void *setup, void *state, const struct job_row *rows, union
         const struct job_row *row = &rows[i];
         union job_result *found = &out[JOB_RESULTS * i];
         if (row->restarts != 0 || now->began == 0) {
-            now->cycle = dcmp_cycle_begin(&by->cycle, __builtin_nanf(""));
+            now->cycle = dcmp_cycle_begin(&by->cycle);
         }
         now->began = 1;
         job_counts();

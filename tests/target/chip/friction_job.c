@@ -4,7 +4,7 @@
 
 struct friction_state {
     struct dcmp_friction_kalman filter;
-    real t; /* s, since it began: a float holds microseconds for some seconds only */
+    real edge; /* s, since the last sample that passed an edge */
     int32_t began;
 };
 
@@ -15,7 +15,9 @@ void friction_step(const struct dcmp_friction_setup *setup, struct friction_stat
 __attribute__((noinline)) void friction_step(const struct dcmp_friction_setup *setup, struct friction_state *now,
                                              const struct job_row *row, union job_result *found)
 {
-    now->filter = dcmp_friction_kalman_update(now->filter, *setup, now->t, row->position, row->voltage);
+    const struct dcmp_friction_times times = {row->gap, now->edge + row->gap};
+    now->filter = dcmp_friction_kalman_update(now->filter, *setup, times, row->position, row->voltage);
+    now->edge = now->filter.edge ? REAL(0.0) : times.edge;
     const struct dcmp_estimate ahead =
         dcmp_friction_ahead(now->filter, *setup, true, row->gap, row->voltage, row->v);
     found[3].number = ahead.position;
@@ -29,10 +31,9 @@ void friction_job(const void *setup, void *state, const struct job_row *rows, un
     for (uint32_t i = 0; i < n; i++) {
         const struct job_row *row = &rows[i];
         union job_result *found = &out[JOB_RESULTS * i];
-        now->t += row->gap;
         if (row->restarts != 0 || now->began == 0) {
-            now->t = REAL(0.0);
-            now->filter = dcmp_friction_begin(*(const struct dcmp_friction_setup *)setup, now->t, row->position);
+            now->edge = REAL(0.0);
+            now->filter = dcmp_friction_begin(*(const struct dcmp_friction_setup *)setup, row->position);
         }
         now->began = 1;
         job_counts();
