@@ -164,12 +164,12 @@ static inline void dcmp_cycle_probe(struct dcmp_cycle *now, const struct dcmp_cy
 {
     now->polarity = dcmp_polarity_check(now->polarity, setup->polarity, sample.tick, sample.position, sample.voltage,
                                         setup->period);
-    const struct dcmp_probe_answer answer = {now->polarity.objection, now->polarity.stage == DCMP_POLARITY_OVER,
-                                             now->polarity.voltage};
-    if (answer.over) {
-        dcmp_tell(&now->notes, (int32_t)DCMP_NOTE_PROBE, now->polarity.gain.gain, now->polarity.gain.deviation);
+    const bool over = now->polarity.stage == DCMP_POLARITY_OVER;
+    if (over) {
+        dcmp_tell(&now->notes, DCMP_NOTE_PROBE, now->polarity.gain.gain, now->polarity.gain.deviation);
     }
-    dcmp_phases_probed(&now->phases, &setup->phases, sample.tick, answer, &now->notes);
+    dcmp_phases_probed(&now->phases, &setup->phases, sample.tick, now->polarity.objection, over,
+                       now->polarity.voltage, &now->notes);
 }
 
 /* From the sample to the estimate, and to the phase of this cycle; whether the trajectory begins with it. Where friction is fed
@@ -210,7 +210,7 @@ static inline bool dcmp_cycle_sense(struct dcmp_cycle *now, const struct dcmp_cy
 static inline void dcmp_cycle_tell_limit(struct dcmp_cycle *now, struct dcmp_limit_told told)
 {
     if (told.limit != DCMP_LIMIT_NONE) {
-        dcmp_tell(&now->notes, (int32_t)DCMP_NOTE_LIMIT + (int32_t)told.limit, told.first, told.second);
+        dcmp_tell(&now->notes, DCMP_NOTE_LIMIT + (int32_t)told.limit, told.first, told.second);
     }
 }
 

@@ -47,11 +47,9 @@ struct dcmp_phases {
 /* What a cycle has to tell, in its order; a cycle has fewer than there are places. */
 #define DCMP_NOTES_MAX 16u
 
-enum dcmp_note_code {
-    DCMP_NOTE_PHASE = 1, /* first: the new phase */
-    DCMP_NOTE_PROBE = 2, /* first, second: gain and its deviation, (rad/s2)/V */
-    DCMP_NOTE_LIMIT = 2  /* plus enum dcmp_limit, 1 to 6; first, second: as there */
-};
+#define DCMP_NOTE_PHASE 1 /* first: the new phase */
+#define DCMP_NOTE_PROBE 2 /* first, second: gain and its deviation, (rad/s2)/V */
+#define DCMP_NOTE_LIMIT 2 /* plus enum dcmp_limit, 1 to 6; first, second: as there */
 
 struct dcmp_note {
     int32_t code;
@@ -83,7 +81,7 @@ static inline void dcmp_phases_enter(struct dcmp_phases *now, enum dcmp_run_phas
     now->phase = next;
     now->since = tick;
     now->stop_from = dcmp_magnitude(now->last);
-    dcmp_tell(notes, (int32_t)DCMP_NOTE_PHASE, REAL((int32_t)next), REAL(0.0));
+    dcmp_tell(notes, DCMP_NOTE_PHASE, REAL((int32_t)next), REAL(0.0));
 }
 
 /* Begin to end the run at a tick; the first cause stays. */
@@ -120,23 +118,17 @@ static inline void dcmp_phases_arm(struct dcmp_phases *now, const struct dcmp_ph
     }
 }
 
-/* What the polarity check says of a sample in PROBING. */
-struct dcmp_probe_answer {
-    struct dcmp_objection refusal;
-    bool over;    /* and all is well */
-    real voltage; /* V, that it wants */
-};
-
-/* Go on probing. A refusal waits for what the checks find in this cycle: a jump is no motion of the arm. */
+/* Go on probing: what the polarity check says of a sample, whether it is over and all is well, and the voltage that it wants, V.
+ * A refusal waits for what the checks find in this cycle: a jump is no motion of the arm. */
 static inline void dcmp_phases_probed(struct dcmp_phases *now, const struct dcmp_phases_setup *setup, int64_t tick,
-                                      struct dcmp_probe_answer answer, struct dcmp_notes *notes)
+                                      struct dcmp_objection refusal, bool over, real voltage, struct dcmp_notes *notes)
 {
-    if (answer.refusal.cause != DCMP_CAUSE_NONE) {
-        now->refusal = answer.refusal;
-    } else if (answer.over) {
+    if (refusal.cause != DCMP_CAUSE_NONE) {
+        now->refusal = refusal;
+    } else if (over) {
         dcmp_phases_enter(now, DCMP_RUN_SETTLING, tick, notes);
     } else {
-        now->push = dcmp_limited(setup->voltage_limit, answer.voltage);
+        now->push = dcmp_limited(setup->voltage_limit, voltage);
     }
 }
 

@@ -27,8 +27,7 @@ void CHECK(phases)(const double *given, const double *rows, double *out, uint32_
         struct dcmp_notes notes = {0};
         dcmp_phases_arm(&now, &setup, tick, &notes);
         if (now.phase == DCMP_RUN_PROBING) {
-            const struct dcmp_probe_answer answer = {objection_of(rows[3], tick), rows[4] != 0.0, (real)rows[5]};
-            dcmp_phases_probed(&now, &setup, tick, answer, &notes);
+            dcmp_phases_probed(&now, &setup, tick, objection_of(rows[3], tick), rows[4] != 0.0, (real)rows[5], &notes);
         }
         const bool begins = dcmp_phases_settled(&now, &setup, tick, &notes);
         dcmp_phases_judge(&now, &setup, tick, objection_of(rows[1], tick), demand, &notes);

@@ -146,7 +146,8 @@ def cppcheck(program: Program, files: Iterable[Path], folder: Path) -> list[Find
             file, number, rule = line.split("\t")
             if file.startswith(str(HERE)):  # the tests' own: only the headers that they include are looked at
                 continue
-            found.add(Finding(rule.removeprefix("misra-c2012-"), file, int(number)))
+            place = file.removeprefix(f"{FIRMWARE}/")  # of a header that a test includes by its path
+            found.add(Finding(rule.removeprefix("misra-c2012-"), place, int(number)))
     return sorted(found)
 
 

@@ -11,14 +11,14 @@
 #define NONE (__builtin_nan(""))
 
 /* What of a cycle comes next. */
-enum { NEXT_SAMPLE = 0, NEXT_SENSE = 1, NEXT_ACT = 2 };
+enum run_next { NEXT_SAMPLE = 0, NEXT_SENSE = 1, NEXT_ACT = 2 };
 
 struct run {
     struct dcmp_cycle_setup setup;
     struct simlib sim;
     struct dcmp_cycle cycle;
     struct dcmp_measurement sample;
-    int64_t next;       /* NEXT_SAMPLE to NEXT_ACT */
+    enum run_next next;
     bool answered;      /* the host has answered what was asked of this cycle */
     bool jumps;         /* the trajectory begins in this cycle */
     double delay;       /* s */
@@ -67,9 +67,8 @@ int64_t run_state_bytes(void)
     return (int64_t)sizeof(struct run);
 }
 
-void run_begin(void *state, const struct run_parameters *parameters)
+void run_begin(struct run *run, const struct run_parameters *parameters)
 {
-    struct run *run = state;
     const struct run first = {
         .setup = run_setup_of(parameters),
         .sim = rig_of(parameters),
@@ -178,7 +177,8 @@ static inline void take_sample(struct run *run)
         const struct dcmp_measurement sample = {run->sim.tick, run->sim.shown, run->sim.voltage};
         run->sample = sample;
     } while (dcmp_cycle_leaves_out(&run->cycle, &run->setup, run->sample));
-    const int64_t due_ns = (int64_t)((double)run->sample.tick * run->period_ns + 0.5);
+    const double rounded_ns = (double)run->sample.tick * run->period_ns + 0.5;
+    const int64_t due_ns = (int64_t)rounded_ns;
     run->now_ns = due_ns > run->now_ns ? due_ns : run->now_ns;
     run->arrived = (double)run->now_ns * 1e-9;
     if (run->first != run->first) {
@@ -239,57 +239,56 @@ static inline int64_t align(struct run *run, const struct job *job)
     return 0;
 }
 
-static inline double *put(double *out, double a, double b, double c)
+static inline void put(double *out, double a, double b, double c)
 {
     out[0] = a;
     out[1] = b;
     out[2] = c;
-    return &out[3];
 }
 
 /* Write the row of a cycle. */
-static inline double *write_row(struct run *run, const struct job *job, double voltage, double *out)
+static inline void write_row(struct run *run, const struct job *job, double voltage, double *row)
 {
     const struct dcmp_cycle *cycle = &run->cycle;
     const struct simlib_plant *plant = &run->sim.plant;
     const struct dcmp_reference then = cycle->reference;
     const double t = dcmp_instant(run->sample.tick, run->setup.period);
-    const struct dcmp_reference now = run->delay == 0.0 ? then : run->now;
-    out = put(out, t, run->sample.position, run->sample.voltage);
-    *out++ = 0.0; /* no fault */
-    out = put(out, cycle->estimate.position, cycle->estimate.velocity, cycle->estimate.disturbance);
-    out = put(out, then.position, then.velocity, then.acceleration);
-    *out++ = cycle->demand;
-    *out++ = voltage;
-    out = put(out, run->arrived - run->previous, run->arrived - run->first - t, 0.0);
-    out = put(out, plant->state.position, plant->state.velocity, plant->disturbance);
-    out = put(out, now.position, now.velocity, now.acceleration);
-    *out++ = job->progress->began;
+    const struct dcmp_reference now = (run->delay == 0.0) ? then : run->now;
+    put(&row[0], t, run->sample.position, run->sample.voltage);
+    row[3] = 0.0; /* no fault */
+    put(&row[4], cycle->estimate.position, cycle->estimate.velocity, cycle->estimate.disturbance);
+    put(&row[7], then.position, then.velocity, then.acceleration);
+    row[10] = cycle->demand;
+    row[11] = voltage;
+    put(&row[12], run->arrived - run->previous, run->arrived - run->first - t, 0.0);
+    put(&row[15], plant->state.position, plant->state.velocity, plant->disturbance);
+    put(&row[18], now.position, now.velocity, now.acceleration);
+    row[21] = job->progress->began;
     run->then = then;
     run->due = t + run->delay;
-    return out;
 }
 
 /* Write what the friction filter tells of itself. */
-static inline double *write_diagnosis(const struct dcmp_friction_kalman *filter, double *out)
+static inline void write_diagnosis(const struct dcmp_friction_kalman *filter, double *out)
 {
     const double variance = filter->covariance.p33;
-    out = put(out, filter->state.d, filter->state.f, variance > 0.0 ? dcmp_square_root(variance) : 0.0);
-    out = put(out, filter->state.s, filter->trust.m, filter->trust.scatter);
-    *out++ = filter->sticks ? 1.0 : 0.0;
-    *out++ = (double)filter->steps;
-    return out;
+    put(&out[0], filter->state.d, filter->state.f, (variance > 0.0) ? dcmp_square_root(variance) : 0.0);
+    put(&out[3], filter->state.s, filter->trust.m, filter->trust.scatter);
+    out[6] = filter->sticks ? 1.0 : 0.0;
+    out[7] = (double)filter->steps;
 }
 
-/* Write what a cycle has to tell. */
-static struct run_event *write_notes(const struct run *run, struct run_event *log)
+/* Write what a cycle has to tell; return how much that is. */
+static inline int64_t write_notes(const struct run *run, struct run_event *log)
 {
-    for (uint32_t i = 0; i < run->cycle.notes.count && i < DCMP_NOTES_MAX; i++) {
+    int64_t told = 0;
+    for (uint32_t i = 0; (i < run->cycle.notes.count) && (i < DCMP_NOTES_MAX); i++) {
         const struct dcmp_note note = run->cycle.notes.note[i];
         const struct run_event event = {run->sample.tick, note.code, note.first, note.second, 0.0};
-        *log++ = event;
+        log[told] = event;
+        told++;
     }
-    return log;
+    return told;
 }
 
 /* -------------------------------------------------------------------------------------------------------------- the run */
@@ -327,7 +326,10 @@ static inline int64_t prepare(struct run *run, const struct job *job)
             return why;
         }
     }
-    return has_row(run, job) ? align(run, job) : RUN_REFERENCES_USED;
+    if (!has_row(run, job)) {
+        return RUN_REFERENCES_USED;
+    }
+    return align(run, job);
 }
 
 /* What a cycle that has ended means for the run: 0 to go on. */
@@ -337,17 +339,19 @@ static inline int64_t ended(const struct run *run, double until)
     if (phases->over) {
         return RUN_OVER;
     }
-    const bool reached = dcmp_instant(run->sample.tick, run->setup.period) >= until;
-    return reached && phases->phase != DCMP_RUN_STOPPING ? RUN_REACHED : 0;
+    if (dcmp_instant(run->sample.tick, run->setup.period) >= until && phases->phase != DCMP_RUN_STOPPING) {
+        return RUN_REACHED;
+    }
+    return 0;
 }
 
-int64_t run_cycles(void *state, struct run_progress *progress, const struct run_reference *rows, int64_t n_rows,
+int64_t run_cycles(struct run *run, struct run_progress *progress, const struct run_reference *rows, int64_t n_rows,
                    double *out, int64_t max_rows, struct run_event *log, int64_t max_log)
 {
-    struct run *run = state;
     const struct job job = {progress, rows, n_rows};
-    struct run_event *const first_event = log;
+    const int64_t width = RUN_FIELDS + (run->setup.knows_friction ? RUN_FURTHER : 0);
     int64_t written = 0;
+    int64_t told = 0;
     int64_t why = 0;
     if (progress->fresh != 0) {
         progress->fresh = 0;
@@ -358,18 +362,21 @@ int64_t run_cycles(void *state, struct run_progress *progress, const struct run_
     while (why == 0) {
         if (written == max_rows) {
             why = RUN_ROWS_FULL;
-        } else if (max_log - (log - first_event) < RUN_EVENTS_MIN) {
+        } else if (max_log - told < RUN_EVENTS_MIN) {
             why = RUN_LOG_FULL;
         } else {
             why = prepare(run, &job);
         }
         if (why == 0) {
+            double *row = &out[written * width];
             const double voltage =
                 dcmp_cycle_act(&run->cycle, &run->setup, run->sample, reference_ahead(run, &job));
             run->sim.amplifier.newest = voltage;
-            out = write_row(run, &job, voltage, out);
-            out = run->setup.knows_friction ? write_diagnosis(&run->cycle.friction, out) : out;
-            log = write_notes(run, log);
+            write_row(run, &job, voltage, row);
+            if (run->setup.knows_friction) {
+                write_diagnosis(&run->cycle.friction, &row[RUN_FIELDS]);
+            }
+            told += write_notes(run, &log[told]);
             run->previous = run->arrived;
             run->next = NEXT_SAMPLE;
             run->cycles++;
@@ -378,7 +385,7 @@ int64_t run_cycles(void *state, struct run_progress *progress, const struct run_
         }
     }
     progress->rows = written;
-    progress->events = log - first_event;
+    progress->events = told;
     report(run, progress);
     return why;
 }

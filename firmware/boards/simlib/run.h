@@ -18,7 +18,7 @@
 #define RUN_EVENTS_MIN 16    /* free places of the log that a cycle may need */
 
 /* Kinds of observers. */
-enum { RUN_SUPER_TWISTING = 0, RUN_FRICTION_KALMAN = 1 };
+enum run_observer_kind { RUN_SUPER_TWISTING = 0, RUN_FRICTION_KALMAN = 1 };
 
 /* An observer R1, from `dcmp_hil.control.observers.super_twisting.Tuning`. */
 struct run_observer {
@@ -145,7 +145,7 @@ struct run_event {
 };
 
 /* Codes of events, with their numbers a, b, c. */
-enum {
+enum run_code {
     RUN_PHASE = 1,        /* a: the new phase, RUN_PROBING to RUN_TRIPPED */
     RUN_PROBE = 2,        /* a, b: gain and its standard deviation, (rad/s2)/V */
     RUN_POSITION = 3,     /* reference limited: a = limit, b = asked for, rad: Limiter's "reference" */
@@ -157,7 +157,7 @@ enum {
 };
 
 /* Phases of a run, in the order of dcmp_hil.safety.supervisor.Phase. */
-enum {
+enum run_phase {
     RUN_ARMING = 0,
     RUN_PROBING = 1,
     RUN_SETTLING = 2,
@@ -168,7 +168,7 @@ enum {
 };
 
 /* Why run_cycles returned. */
-enum {
+enum run_reason {
     RUN_ROWS_FULL = 1,       /* `out` has no free row: take the rows, call again */
     RUN_LOG_FULL = 2,        /* `log` has fewer than RUN_EVENTS_MIN free places: take the events, call again */
     RUN_BEGINS = 3,          /* the trajectory begins at `began`, from x0: make rows from `tick` on, call again */
@@ -215,12 +215,14 @@ struct run_progress {
 
 #define RUN_API __attribute__((visibility("default")))
 
+struct run; /* its state: run_state_bytes() bytes */
+
 RUN_API int64_t run_state_bytes(void);
-RUN_API void run_begin(void *state, const struct run_parameters *parameters);
+RUN_API void run_begin(struct run *run, const struct run_parameters *parameters);
 
 /* Run cycles; `out` has `max_rows` rows of RUN_FIELDS numbers, with the friction filter RUN_FIELDS + RUN_FURTHER. Returns why
  * it stopped, RUN_ROWS_FULL to RUN_OVER. */
-RUN_API int64_t run_cycles(void *state, struct run_progress *progress, const struct run_reference *rows, int64_t n_rows,
+RUN_API int64_t run_cycles(struct run *run, struct run_progress *progress, const struct run_reference *rows, int64_t n_rows,
                            double *out, int64_t max_rows, struct run_event *log, int64_t max_log);
 
 #endif

@@ -35,7 +35,7 @@ static inline struct dcmp_limiter_setup run_limiter_of(const struct run_paramete
         .acceleration = REAL(p->reference_a_max),
         .error = REAL(p->error_max),
         .chatter = REAL(p->chatter_max),
-        .block = p->watched != 0 ? (int32_t)p->chatter_cycles : 0,
+        .block = (p->watched != 0) ? (int32_t)p->chatter_cycles : 0,
         .slews = p->slew < __builtin_inf(),
     };
     return limiter;
@@ -49,7 +49,7 @@ static inline struct dcmp_cycle_setup run_setup_of(const struct run_parameters *
         .delayed = p->delay_samples == 1.0,
         .measured = p->measured != 0,
         .feedforward = p->feedforward != 0,
-        .knows_friction = p->observer_kind == RUN_FRICTION_KALMAN,
+        .knows_friction = p->observer_kind == (int64_t)RUN_FRICTION_KALMAN,
         .watched = p->watched != 0,
         .governed = p->governed != 0,
         .own = run_observer_of(&p->own, REAL(p->ku)),
