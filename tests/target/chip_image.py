@@ -60,12 +60,8 @@ def build_image(folder: Path) -> Path:
     built = folder / "image.elf"
     command = [
         *(needed("arm-none-eabi-gcc"), *WARNINGS, *LAW, *SINGLE, *M4, LEVEL, WHOLE, "-g"),
-        *(
-            "-fno-tree-loop-distribute-patterns",
-            "-nostdlib",
-            "-Wl,--no-enum-size-warning",
-            "-Wl,--fatal-warnings",
-        ),
+        *("-fno-tree-loop-distribute-patterns", "-nostdlib"),
+        *("-Wl,--no-enum-size-warning", "-Wl,--fatal-warnings"),
         *("-T", str(HERE / "image.ld"), *map(str, [HERE / "image.c", *JOB_FILES]), "-lgcc", "-o", str(built)),
     ]
     subprocess.run(command, check=True)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from dcmp_hil import run
+from tests.firmware.core_library import CORE, law_headers
 from tests.helpers import bench
+from tests.target.build import FIRMWARE
 from tests.target.chip_image import closed_loop, here
 from tests.target.chip_rigs import FED_FORWARD, RIGS, parameters
+from tools.boards import read_boards
 
 if TYPE_CHECKING:
     import ctypes
@@ -72,3 +76,16 @@ def test_a_loop_that_runs_for_a_day_is_that_of_its_first_second(library: ctypes.
         later = loop.order.rows.copy()
         later["tick"] += DAY_TICKS
         assert np.array_equal(here(library, loop.order._replace(rows=later)), loop.results)
+
+
+def test_no_program_of_a_board_has_the_law() -> None:
+    """It is tried on its own first; the boards' images and the traces of the wire stay what they were."""
+    folders = [FIRMWARE / "app", FIRMWARE / "soc", *(FIRMWARE / "boards" / name for name in read_boards())]
+    files = [path for folder in folders for path in folder.rglob("*.[ch]")] + sorted(CORE.glob("*.c"))
+    law = {header.name for header in law_headers()} | {"dcmp_real.h"}
+    assert len(files) > 60
+    assert {"dcmp_control.h", "dcmp_cycle.h"} <= law
+    found = {
+        path.name for path in files if law & set(re.findall(r'#include "([^"]+)"', path.read_text("utf-8")))
+    }
+    assert found == set()
