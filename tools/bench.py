@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcmp_hil import load_rig, loop, run
+from dcmp_hil import load_rig, loop, run, simulate
 from dcmp_hil.assembly import assemble
 from dcmp_hil.control.observers import ObserverContext
 from dcmp_hil.control.observers.paper import PaperObserver
@@ -24,6 +24,7 @@ from tools.bench_core import core_ratios
 from tools.bench_lanes import BARS, LaneCosts, lane_costs
 from tools.bench_lateness import Lateness, lateness, period_us
 from tools.bench_observers import RATIO_MAX, observer_costs
+from tools.bench_simulate import simulate_costs
 from tools.bench_telemetry import Endurance, endurance, record_us
 from tools.bench_wire import codec_us, round_trips
 
@@ -77,9 +78,9 @@ def _line_factor(rig: Rig, *, telemetry: bool, seconds: float = 20.0) -> float:
 
 
 def _whole_factor(rig: Rig, seconds: float = 20.0) -> float:
-    """Device time over CPU time of `run()`: figures and all columns kept."""
+    """Device time over CPU time of `run()` by the loop: figures and all columns kept."""
     began = time.process_time()
-    run(rig, duration=seconds, fast=True)
+    simulate(rig, seconds, plain=True)
     return seconds / (time.process_time() - began)
 
 
@@ -132,7 +133,8 @@ def _rows() -> list[Row]:
             "",
             lambda: _line_factor(bench, telemetry=True),
         ),
-        _row("run(), figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
+        _row("run() by the loop, figures and columns kept, 200 us", "x", "", lambda: _whole_factor(bench)),
+        *_simulate_rows(),
         _row("super_twisting (R1), one step", "us", "<= 2", lambda: _step_us(lambda: SuperTwisting(setting))),
         _row(
             "super_twisting, a step 5 % off the period",
@@ -162,8 +164,20 @@ def _core_rows() -> list[Row]:
     """Compare a run on the core with the same run on the Python plant, taken in turn."""
     found = [core_ratios(step_us) for step_us in (200.0, 20.0)]
     return [
-        _row_of(f"run(), the Python plant to the core, {one.step_us:g} us", one.ratios, "x", one.goal)
+        _row_of(
+            f"run() by the loop, the Python plant to the core, {one.step_us:g} us", one.ratios, "x", one.goal
+        )
         for one in found
+    ]
+
+
+def _simulate_rows() -> list[Row]:
+    """Compare whole runs in the core and in the loop, taken in turn."""
+    found = simulate_costs()
+    return [
+        _row_of("simulate() by the loop, 30 s as shipped", found.loop, "x", ""),
+        _row_of("simulate() in the core, 30 s as shipped", found.core, "x", found.goal),
+        _row_of("ratio of the two", found.ratios, "x", ""),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Cost of a run with the plant on the compiled core against the same run with the Python plant."""
+"""Cost of a run of the loop with the plant on the compiled core against the same with the Python plant."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import statistics
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcmp_hil import load_rig, run
+from dcmp_hil import load_rig, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,5 +48,5 @@ def core_ratios(step_us: float) -> CoreRatios:
 def _cost(step_us: float, engine: str, duration: float) -> float:
     rig = load_rig("bench-1khz", [f"sim.step_us={step_us}", f"sim.engine={engine}"])
     began = time.process_time()
-    run(rig, duration=duration, fast=True)
+    simulate(rig, duration, plain=True)
     return time.process_time() - began

@@ -46,6 +46,8 @@ def run_document(
         "motor_gain": result.motor_gain and result.motor_gain.document(),
         "troubles": result.troubles,
         "changes": result.changes,
+        "engine": result.engine,
+        "engine_reason": result.engine_reason,
         "realtime": {grant.what: grant.refusal or "granted" for grant in result.grants},
         "host": result.host,
     }
