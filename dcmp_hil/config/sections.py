@@ -123,7 +123,7 @@ class SimSection(Section):
         Field(description="; ".join(f"`{word}`: {what}" for word, (_, what) in PLANTS.items()) + "."),
     ] = next(iter(PLANTS))
     engine: Literal["core", "python"] = "core"
-    """`core`: the plant compiled from the firmware's C, if it is `moreau`; `python`: the same, slower."""
+    """`core`: the firmware's C computes the plant, and runs in virtual time; `python`: the same, slower."""
     position_rad: Annotated[float, Field(ge=-100, le=100)] = 0.0
     """Position of the arm at the start, at rest, rad; 0 = hanging."""
     encoder_phase_counts: Annotated[float, Field(ge=0, lt=1)] = 0.0
