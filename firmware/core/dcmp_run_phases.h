@@ -173,9 +173,7 @@ static inline void dcmp_phases_judge(struct dcmp_phases *now, const struct dcmp_
         const struct dcmp_objection no_number = {tick, DCMP_CAUSE_DEMAND, demand, REAL(0.0)};
         dcmp_phases_stop(now, no_number, tick, notes);
     }
-    if (!dcmp_has_authority(now)) {
-        dcmp_phases_leave(now, setup, tick, notes);
-    }
+    dcmp_phases_leave(now, setup, tick, notes);
 }
 
 /* The voltage in every phase but RUNNING, V. */
@@ -187,8 +185,8 @@ static inline real dcmp_partial_voltage(const struct dcmp_phases *now, const str
     if (now->phase == DCMP_RUN_PROBING) {
         return now->push;
     }
-    if (now->phase == DCMP_RUN_ENGAGING && gone > REAL(0.0)) { /* at 0 an infinite limit would give NaN */
-        most = setup->voltage_limit * gone / setup->engage;
+    if (now->phase == DCMP_RUN_ENGAGING) {
+        most = setup->voltage_limit * gone / setup->engage; /* NaN of an infinite limit at once: that is 0 V */
     } else if (now->phase == DCMP_RUN_STOPPING) {
         most = now->stop_from * (REAL(1.0) - gone / DCMP_RAMP_TIME);
     } else {

@@ -15,7 +15,7 @@ from dcmp_hil.errors import TripError
 from dcmp_hil.platform.clock import SimulatedClock
 from dcmp_hil.platform.stop_request import StopRequest
 from dcmp_hil.safety.supervisor import Phase, Supervisor
-from dcmp_hil.values import Cycle, Event, EventKind, LimitData, PhaseData, Reference, Sample
+from dcmp_hil.values import Cycle, Event, LimitData, PhaseData, ProbeData, Reference, Sample
 from sim_backend.core_run.library import load
 from sim_backend.core_run.parameters import parameters_of
 from tests.firmware.law import Array, Law, same_bits
@@ -175,21 +175,21 @@ class Ride:
             assert any(form.format(last[16]) in text for form in FORMATS)
 
 
-def _told(kept: Array, t: list[float]) -> list[tuple[float, int, float]]:
+def _told(kept: Array, t: list[float]) -> list[tuple[float, int, float, float]]:
     told = []
     for row, at in zip(kept.tolist(), t, strict=True):
         notes = [row[19 + 3 * k : 22 + 3 * k] for k in range(int(row[18]))]
-        told += [(at, int(code), first if code <= 2 else 0.0) for code, first, _ in notes]
+        told += [(at, int(code), *(numbers if code <= 2 else (0.0, 0.0))) for code, *numbers in notes]
     return told
 
 
-def _code(event: Event) -> tuple[int, float]:
+def _code(event: Event) -> tuple[int, float, float]:
     if isinstance(event.data, PhaseData):
-        return 1, PHASES.index(Phase(event.data.phase))
+        return 1, PHASES.index(Phase(event.data.phase)), 0.0
     if isinstance(event.data, LimitData):
-        return 2 + LIMITS.index(event.data.limit), 0.0
-    assert event.kind is EventKind.PROBE
-    return 2, event.data.gain_rad_s2_V  # type: ignore[union-attr]
+        return 2 + LIMITS.index(event.data.limit), 0.0, 0.0
+    assert isinstance(event.data, ProbeData)
+    return 2, event.data.gain_rad_s2_V, event.data.deviation_rad_s2_V
 
 
 AT_ONCE = 'supervisor.start="immediate"'
