@@ -153,8 +153,6 @@ class CoreCycles:
     def _deliver(self) -> None:
         """Give the recorder the rows of the block."""
         rows, self._block, self._filled = self._block[: self._filled], self._block[:0], 0
-        if not len(rows):
-            return
         if not len(self._last):
             self._first_position = float(rows[0, _POSITION_ESTIMATE])
         self._last = np.concatenate((self._last, rows[-self._kept :]))[-self._kept :]

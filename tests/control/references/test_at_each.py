@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dcmp_hil.control.references import ReferenceSettings
+from dcmp_hil.control.references import ReferenceSettings, periodic
 from dcmp_hil.control.references.periodic import Chirp, Sine
 from dcmp_hil.control.references.piecewise import Hold, Step, Trapezoid
 from dcmp_hil.control.references.table import Table
@@ -81,6 +81,12 @@ def test_references_at_many_instants_have_the_bits_of_one(kind: str) -> None:
     draw = random.Random(7)
     for _ in range(_CASES):
         _check(_random(kind, draw), _instants(draw))
+
+
+@pytest.mark.parametrize("kind", ["sine", "chirp"])
+def test_sines_of_math_have_the_bits_of_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(periodic, "_numpy_is_math", lambda: False)
+    test_references_at_many_instants_have_the_bits_of_one(kind)
 
 
 def test_trapezoid_without_a_distance_rests_at_many_instants() -> None:
