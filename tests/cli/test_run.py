@@ -17,7 +17,7 @@ PROMISED = {
     *("tracking_rms_rad", "tracking_max_rad", "velocity_error_rms_rad_s", "velocity_error_max_rad_s"),
     *("disturbance_error_rms_rad_s2", "voltage_peak_V", "voltage_tv_V_s", "periods", "late_periods"),
     *("period_us", "lateness_us", "compute_us", "rate_error_ppm", "realtime_factor", "window_s"),
-    *("overruns", "outliers", "realtime", "host"),
+    *("overruns", "outliers", "engine", "engine_reason", "realtime", "host"),
 }
 
 
@@ -38,6 +38,7 @@ def test_run_gives_promised_keys_when_json_goes_to_stdout(cli: Cli) -> None:
     assert figures["late_periods"] == figures["overruns"] == 0
     assert figures["rate_error_ppm"] == pytest.approx(0.0, abs=1e-6)
     assert figures["realtime"] == {}  # virtual time asks for nothing
+    assert (figures["engine"], figures["engine_reason"]) == ("core", "")
     assert figures["host"]["cpus"] >= 1
 
 
@@ -184,3 +185,11 @@ def test_help_names_every_command(cli: Cli) -> None:
     out = cli("--help").out
     for command in ("run", "check", "paper", "replay", "rigs"):
         assert command in out
+
+
+def test_fast_run_by_the_loop_says_so_and_why(cli: Cli) -> None:
+    by_loop = cli("run", "--fast", "--no-record", "--duration", "0.2", "--set", "sim.engine=python")
+    assert by_loop.code == 0
+    assert 'the loop of the host ran it, not the core: sim.engine is "python".' in by_loop.err
+    in_core = cli("run", "--fast", "--no-record", "--duration", "0.2")
+    assert "the loop of the host" not in in_core.err
