@@ -83,6 +83,12 @@ def summed(total: float, values: NDArray[np.float64]) -> float:
     return float(np.add.accumulate(np.concatenate(([total], values)))[-1])
 
 
+def known_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values that are numbers; a copy only where some are none."""
+    unknown = np.isnan(values)
+    return values[~unknown] if unknown.any() else values
+
+
 class ErrorStatistics:
     """Root mean square and maximum of a column that comes in pieces; NaN is left out."""
 
@@ -91,7 +97,7 @@ class ErrorStatistics:
 
     def add(self, values: NDArray[np.float64]) -> None:
         """Add the next block."""
-        known = values[~np.isnan(values)]
+        known = known_of(values)
         if len(known):
             self._n += len(known)
             self._squares = summed(self._squares, known * known)
@@ -122,7 +128,7 @@ class Durations:
 
     def add(self, values: NDArray[np.float64]) -> None:
         """Add the next block of durations, s; NaN is left out."""
-        known = values[~np.isnan(values)]
+        known = known_of(values)
         if not len(known):
             return
         least, most = float(known.min()), float(known.max())
@@ -244,5 +250,5 @@ class Statistics:
     def _add_voltage(self, voltage: NDArray[np.float64]) -> None:
         self._peak = max(self._peak, float(np.abs(voltage).max()))
         steps = np.abs(np.diff(voltage, prepend=self._last_voltage))
-        self._variation = summed(self._variation, steps[~np.isnan(steps)])  # nothing is before the very first
+        self._variation = summed(self._variation, known_of(steps))  # nothing is before the very first
         self._last_voltage = float(voltage[-1])
