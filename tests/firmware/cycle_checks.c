@@ -1,7 +1,7 @@
 #include "../../firmware/boards/simlib/run_setup.h"
 #include "law_checks.h"
 
-#define ROW 36
+#define ROW 39
 #define NOTES 5u
 
 static void put_cycle(const struct dcmp_cycle *now, double *out)
@@ -32,6 +32,9 @@ static void put_cycle(const struct dcmp_cycle *now, double *out)
     }
     out[34] = (double)now->polarity.gain.gain;
     out[35] = (double)now->polarity.gain.deviation;
+    out[36] = (double)now->trajectory.x0;
+    out[37] = (double)now->trajectory.start;
+    out[38] = now->trajectory.begun ? 1.0 : 0.0;
 }
 
 void CHECK(cycle)(const double *parameters, const double *rows, double *out, uint32_t n)

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from dcmp_hil.telemetry.block import Block
     from tests.firmware.bench import Core
 
-WIDTH = 36
+WIDTH = 39
+NUMBERS = 1  # of enum dcmp_cause
+UNUSED = (7.0, -7.0)  # rad/s, where nothing is fed forward
 PHASES = list(Phase)
 LIMITS = ["", "reference", "velocity", "acceleration", "way", "voltage", "slew"]
 CAUSES: Mapping[str, tuple[int, ...]] = {
@@ -46,7 +48,18 @@ CAUSES: Mapping[str, tuple[int, ...]] = {
     "chatter": (17,),
 }
 """Words of `TripRequest` and numbers of enum dcmp_cause."""
-FORMATS = ("{:.2f}", "{:+.3f}", "{:+.4f}", "{:.2g}", "{:.0f}", "{:,.0f}", "{:.1f}")
+FORMATS = {
+    2: " {} V",
+    7: " {:+.3f} rad",
+    **dict.fromkeys((3, 4, 5), " {:.2f} rad"),
+    6: " {:.0f} rad/s2",
+    9: " {:+.3f} rad",
+    **dict.fromkeys((11, 12, 13, 14), "{:+.4f} rad"),
+    15: "reference {:.2f} rad",
+    16: "({:.1f} V",
+    17: " {:,.0f} V/s",
+}
+"""How a sentence has the first number of a cause."""
 
 
 class Seen:
@@ -94,7 +107,7 @@ class Seen:
 
     def record(self, cycle: Cycle) -> None:
         self.cycles.append(cycle)
-        self.rows[-1][3:] = [*(self._velocities or [0.0, 0.0]), *self._reference]
+        self.rows[-1][3:] = [*(self._velocities or UNUSED), *self._reference]
         self._velocities.clear()
 
 
@@ -154,8 +167,12 @@ class Ride:
         t = [cycle.sample.t for cycle in cycles]
         assert [t[k] for k in np.flatnonzero(kept[:, 9])] == self.seen.begun
         assert _told(kept, t) == [(one.t, *_code(one)) for one in self.events]
+        began = self.seen.begun
+        place = t.index(began[0]) if began else 0
+        assert kept[-1, 36] == cycles[place].estimate.position
+        assert tuple(kept[-1, 37:]) == (round(began[0] / self.period) if began else 0.0, float(bool(began)))
         gain = self.supervisor.motor_gain
-        assert tuple(kept[-1, 34:]) == ((gain.gain, gain.deviation) if gain else (0.0, 0.0))
+        assert tuple(kept[-1, 34:36]) == ((gain.gain, gain.deviation) if gain else (0.0, 0.0))
         self._check_end(kept[-1].tolist())
 
     def _check_end(self, last: list[float]) -> None:
@@ -170,9 +187,16 @@ class Ride:
         assert int(last[13]) in CAUSES[self.trip.reason]
         assert (last[12] == 1.0) == self.trip.orderly
         text = str(self.trip)
-        assert last[13] == 1.0 or any(form.format(last[15]) in text for form in FORMATS)
-        if self.trip.reason in {"tracking", "moving", "power", "polarity"}:
-            assert any(form.format(last[16]) in text for form in FORMATS)
+        cause, first, second = int(last[13]), last[15], last[16]
+        assert ("Not every number is finite at" in text) == (cause == NUMBERS)
+        if cause in FORMATS:
+            assert FORMATS[cause].format(first) in text
+        assert (
+            second == 0.0
+            or f"{second:+.4f} rad" in text
+            or f"{second:.2f}" in text
+            or f"{second:.3f}" in text
+        )
 
 
 def _told(kept: Array, t: list[float]) -> list[tuple[float, int, float, float]]:
@@ -205,7 +229,7 @@ RIDES: Mapping[str, tuple[str, ...]] = {
     "filter": (FILTER, "sim.lost_samples=0.1"),
     "filter, measured": (FILTER, AT_ONCE, 'controller.position="measured"', "loop.delay_samples=0"),
     "finite": (AT_ONCE, 'supervisor.monitors="finite"'),
-    "governed": (AT_ONCE, "reference.amplitude_rad=5", "supervisor.position_limit_rad=4"),
+    "governed": (AT_ONCE, "reference.soft_start_s=0", "reference.amplitude_rad=5", "reference.rate_rad_s=9"),
     "limits": ("amplifier.slew_V_s=50", "amplifier.voltage_limit_V=2", "sim.plant.f1_rad_s2=8"),
     "stuck": ("sim.plant.f1_rad_s2=60",),
     "falls": ("sim.position_rad=1.5",),
