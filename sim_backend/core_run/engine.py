@@ -73,8 +73,10 @@ class CoreEngine:
 
 def _reasons(rig: Rig, stages: LoopStages, recorder: Recorder) -> Iterator[str]:
     backend = stages.backend
-    if type(backend) is not SimBackend:
+    if rig.backend.kind != "sim":
         yield f'the core simulates the rig itself: backend.kind is "{rig.backend.kind}", and not "sim".'
+    elif type(backend) is not SimBackend:
+        yield "the core injects no faults, and has no backend but its own."
     elif backend.why_not_core:
         yield backend.why_not_core
     for name, classes in _KNOWN.items():

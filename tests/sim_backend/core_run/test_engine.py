@@ -60,12 +60,12 @@ def test_a_class_of_ones_own_runs_in_the_loop() -> None:
 
 
 @pytest.mark.parametrize(
-    "faults", [["plant.shove:rad_s2=30,at=5ms,for=1ms"], ["host.raise:where=observer,at=50ms"]]
+    "fault", ["plant.shove:rad_s2=30,at=5ms,for=1ms", "host.raise:where=observer,at=50ms"]
 )
-def test_a_fault_runs_in_the_loop(faults: list[str]) -> None:
-    result = simulate(bench(), 0.004, faults=faults)
+def test_a_fault_runs_in_the_loop_and_is_the_reason(fault: str) -> None:
+    result = simulate(bench(), 0.004, faults=[fault])
     assert result.engine == "plain"
-    assert result.engine_reason
+    assert result.engine_reason.startswith("the core injects no faults")
 
 
 def test_observers_beside_the_loop_run_in_the_loop() -> None:
