@@ -240,8 +240,6 @@ def _conclude(session: Session, options: Options, folder: RunFolder | None, end:
         if options.json_file == "-":
             console.write_json("-", document)
         else:
-            if result.engine_reason:
-                console.note(f"the loop of the host ran it, not the core: {result.engine_reason}")
             console.out.print(summary_table(session.rig, result, ended_by))
             if comparison is not None:
                 console.out.print(comparison_table(comparison))

@@ -34,7 +34,7 @@ def summary_table(rig: Rig, result: Result, ended_by: str) -> Group:
     """Return tables of the figures (name, value, unit) and of the durations (one quantile a column)."""
     start, stop = result.summary.window_s
     title = Text.assemble((rig.name, "bold"), f"  {start:.2f} to {stop:.2f} s, ended by {ended_by}")
-    return Group(title, "", _figures(result), *_durations(result), *_refusals(result))
+    return Group(title, "", _figures(result), *_engine(result), *_durations(result), *_refusals(result))
 
 
 def _figures(result: Result) -> Table:
@@ -67,6 +67,12 @@ def _figures(result: Result) -> Table:
     if result.dropped:
         table.add_row("[yellow]lost to telemetry", str(result.dropped), "periods, in no figure above")
     return table
+
+
+def _engine(result: Result) -> list[RenderableType]:
+    """Return why a run in virtual time was not in the core, if it was not."""
+    reason = result.engine_reason
+    return [Text(f"the loop of the host ran it, not the core: {reason}", style="dim")] if reason else []
 
 
 def _friction(found: FrictionFindings | None) -> list[tuple[str, str, str]]:

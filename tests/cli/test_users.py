@@ -44,11 +44,9 @@ def test_virtual_device_is_compiled_where_there_is_no_home(installed: Path, tmp_
     board = ("--set", "backend.kind=sim-board", "--viewer", "none")
     done = as_stranger(installed, tmp_path, "run", "--fast", "--duration", "1", *board, TMPDIR=str(place))
     assert done.returncode == 0, done.stderr
-    told = [
+    assert [
         line for line in done.stderr.splitlines() if not line.startswith(("kept", "no viewer", "or look"))
-    ]
-    assert len(told) == 1  # the core has no wire
-    assert told[0].startswith("the loop of the host ran it")
+    ] == []
     (run,) = (tmp_path / "runs").iterdir()
     assert {path.name for path in run.iterdir()} == {"summary.json", "run.mcap", "run.rrd", "run.png"}
     cache = place / f"dcmp-hil-{OTHER_USER_ID}"

@@ -60,7 +60,8 @@ void filter(struct dcmp_friction_kalman *state, const struct dcmp_friction_setup
 void filter(struct dcmp_friction_kalman *state, const struct dcmp_friction_setup *setup,
             const float *x, float *out)
 {
-    *state = dcmp_friction_kalman_update(*state, *setup, x[0], x[1], x[2]);
+    const struct dcmp_friction_times times = {x[0], x[6]};
+    *state = dcmp_friction_kalman_update(*state, *setup, times, x[1], x[2]);
     const struct dcmp_estimate estimate = dcmp_friction_ahead(*state, *setup, true, x[3], x[4], x[5]);
     out[0] = estimate.position;
     out[1] = estimate.velocity;
