@@ -18,6 +18,7 @@ from dcmp_hil.safety.supervisor import Phase, Supervisor
 from dcmp_hil.values import Cycle, Event, LimitData, PhaseData, ProbeData, Reference, Sample
 from sim_backend.core_run.library import load
 from sim_backend.core_run.parameters import parameters_of
+from tests.firmware.causes import CAUSES, FORMATS
 from tests.firmware.law import Array, Law, same_bits
 from tests.helpers import bench
 
@@ -32,34 +33,6 @@ NUMBERS = 1  # of enum dcmp_cause
 UNUSED = (7.0, -7.0)  # rad/s, where nothing is fed forward
 PHASES = list(Phase)
 LIMITS = ["", "reference", "velocity", "acceleration", "way", "voltage", "slew"]
-CAUSES: Mapping[str, tuple[int, ...]] = {
-    "not_finite": (1, 2, 8),
-    "speed": (3, 5),
-    "travel": (4,),
-    "disturbance": (6,),
-    "jump": (7,),
-    "moving": (9,),
-    "slew": (10,),
-    "power": (11, 13),
-    "polarity": (12,),
-    "gain": (14,),
-    "tracking": (15,),
-    "saturation": (16,),
-    "chatter": (17,),
-}
-"""Words of `TripRequest` and numbers of enum dcmp_cause."""
-FORMATS = {
-    2: " {} V",
-    7: " {:+.3f} rad",
-    **dict.fromkeys((3, 4, 5), " {:.2f} rad"),
-    6: " {:.0f} rad/s2",
-    9: " {:+.3f} rad",
-    **dict.fromkeys((11, 12, 13, 14), "{:+.4f} rad"),
-    15: "reference {:.2f} rad",
-    16: "({:.1f} V",
-    17: " {:,.0f} V/s",
-}
-"""How a sentence has the first number of a cause."""
 
 
 class Seen:
