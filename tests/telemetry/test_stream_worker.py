@@ -69,6 +69,26 @@ def test_a_stuck_job_is_noticed_and_close_returns(gate: threading.Event) -> None
     assert stream.done == []
 
 
+def test_a_stream_that_is_dropped_ends_with_the_job_at_hand(gate: threading.Event) -> None:
+    """What waits could be megabytes, on a disk that is to keep room for the data."""
+    stream, begun = Stream(), threading.Event()
+    way = outlet(stream)
+
+    def first(s: Any) -> None:
+        begun.set()
+        gate.wait()
+        s.done.append("first")
+
+    way.do(first)
+    assert begun.wait(10.0)
+    for k in range(5):
+        way.do(lambda s, k=k: s.done.append(k))  # type: ignore[misc]
+    way.drop()
+    gate.set()
+    way.close(10.0)
+    assert stream.done == ["first", "flushed", "disconnected"]
+
+
 def test_a_stream_that_cannot_be_flushed_is_left_as_it_is() -> None:
     stream = Stream(full=True)
     outlet(stream).close(10.0)

@@ -185,7 +185,7 @@ class RerunSink:
         for feed in tuple(self._feeds):
             file = feed.outlet.file
             if file is not None and self._needed and short_of(file, self._needed + _BLOCK_BYTES):
-                feed.outlet.leave()
+                feed.outlet.drop()
                 self._feeds.remove(feed)
                 self.warnings.append(spared(file, "ends here", self._needed))
 

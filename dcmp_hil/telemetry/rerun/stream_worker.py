@@ -7,7 +7,7 @@ import threading
 import weakref
 from contextlib import suppress
 from pathlib import Path
-from queue import Full, Queue
+from queue import Empty, Full, Queue
 from typing import TYPE_CHECKING
 
 from dcmp_hil.platform.clock import MonotonicClock
@@ -179,6 +179,16 @@ class StreamWorker:
         """End the stream after the last job, and wait for nothing."""
         with suppress(Full):
             self._jobs.put_nowait(None)
+
+    def drop(self) -> None:
+        """End the stream after the job at hand, leave the others out, and wait for nothing.
+
+        Where the producer is much faster than the disk, what waits is megabytes.
+        """
+        with suppress(Empty):
+            while True:
+                self._jobs.get_nowait()
+        self.leave()
 
     def _serve(self) -> None:
         while (job := self._jobs.get()) is not None:
