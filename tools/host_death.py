@@ -107,11 +107,11 @@ def _part(device: VirtualDevice, host: subprocess.Popen[bytes], way: str, cable:
         os.waitid(os.P_PID, host.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT)
     done_us, doubt_us = device.clock_us()  # it is done by now
     wait(lambda: not device.output.enable, "the amplifier is off")
-    off = next(output for output in device.log if output.fault and not output.enable)
+    off = next(output for output in tuple(device.log) if output.fault and not output.enable)
     if way == "SIGSTOP":
         host.send_signal(signal.SIGCONT)
     code = host.wait(WAIT_TIMEOUT_S)
-    since = [output for output in device.log if output.since_us >= off.since_us]
+    since = [output for output in tuple(device.log) if output.since_us >= off.since_us]
     deed_us = done_us if way == "SIGSTOP" else began_us
     return Death(
         way=way,

@@ -197,8 +197,8 @@ def _end(device: VirtualDevice, host: subprocess.Popen[bytes], name: str, folder
     at_ns, before_ns = map(int, deed.read_text().split())
     late_us = max(0, device.longest_gap_us(at_ns) - _PERIOD_US)
     deed_us, doubt_us = device.clock_us(at_ns)
-    off = next(output for output in reversed(device.log) if output.enable or output.voltage_mV)
-    off_us = next(o.since_us for o in device.log if o.since_us > off.since_us and not o.voltage_mV)
+    off = next(output for output in reversed(tuple(device.log)) if output.enable or output.voltage_mV)
+    off_us = next(o.since_us for o in tuple(device.log) if o.since_us > off.since_us and not o.voltage_mV)
     said = host.communicate(timeout=WAIT_TIMEOUT_S)[1].decode().strip().splitlines()
     gone_s = 1e-9 * (clock.now_ns() - at_ns)
     files = [file for file in folder.glob("runs/*/*") if file.stat().st_size]

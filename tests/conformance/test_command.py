@@ -87,7 +87,7 @@ def test_the_virtual_device_passes(script: Script, installed: Path, tmp_path: Pa
 def test_without_arm_nothing_is_armed(script: Script, tmp_path: Path) -> None:
     with virtual_device() as device:
         done = script("conform", device.port, "--json", "-", timeout=TIMEOUT_S)
-        assert not any(output.enable or output.voltage_mV for output in device.log)
+        assert not any(output.enable or output.voltage_mV for output in tuple(device.log))
     report = json.loads(done.out)
     assert done.code == 0, done.err
     assert report["counts"]["needs --arm"] == sum(check.needs_arm for check in CHECKS)
@@ -232,7 +232,7 @@ def test_a_person_is_asked(installed: Path, tmp_path: Path, answer: str, code: i
                 timeout=TIMEOUT_S,
                 check=False,
             )
-            ran = any(output.enable for output in device.log)
+            ran = any(output.enable for output in tuple(device.log))
     finally:
         os.close(master)
         os.close(slave)

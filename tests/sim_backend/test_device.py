@@ -170,7 +170,7 @@ def test_silent_host_is_noticed_in_plant_time() -> None:
         fed_us = device.now_us - 1000  # the last DRIVE came before the newest tick, and time stood still
         device.run_ticks(25)
         assert device.output.fault == Fault.HOST_SILENT
-        silent_us = next(o.now_us for o in device.log if o.state == State.FAULT) - fed_us
+        silent_us = next(o.now_us for o in tuple(device.log) if o.state == State.FAULT) - fed_us
         assert 20_000 < silent_us <= 21_000
 
 

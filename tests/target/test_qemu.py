@@ -75,7 +75,7 @@ def test_silent_host_is_noticed_on_the_target(qemu: Sequence[str]) -> None:
                 backend.write(2.0)
             while not device.output.fault:
                 assert device.error is None
-        off = next(output for output in device.log if output.fault)
+        off = next(output for output in tuple(device.log) if output.fault)
     assert Fault(off.fault) is Fault.HOST_SILENT
     assert (off.voltage_mV, off.enable) == (0, 0)
     assert 20_000 < off.since_us - off.fed_us <= 21_000
